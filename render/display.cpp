@@ -14,31 +14,28 @@
 #include <array>
 #include <csignal>
 #include <cstdlib>
-#include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace palpate::render {
 namespace {
 
 // One record of an Xauthority file (Xau(3)): family "any", no address, no number, name, a random key.
-int secretCookie()
+base::Descriptor secretCookie()
 {
     const std::string name = "MIT-MAGIC-COOKIE-1";
     std::array<char, 16> key{};
     if (::getrandom(key.data(), key.size(), 0) != static_cast<ssize_t>(key.size()))
-        return -1;
+        return base::Descriptor();
     std::string record("\xff\xff\0\0\0\0\0", 7);
     record += static_cast<char>(name.size());
     record += name;
     record += '\0';
     record += static_cast<char>(key.size());
     record.append(key.data(), key.size());
-    const int file = ::memfd_create("palpate-xauthority", MFD_CLOEXEC);
-    if (file >= 0 && ::write(file, record.data(), record.size()) != static_cast<ssize_t>(record.size())) {
-        ::close(file);
-        return -1;
-    }
-    return file;
+    base::Descriptor file(::memfd_create("palpate-xauthority", MFD_CLOEXEC));
+    const bool written = ::write(*file, record.data(), record.size()) == static_cast<ssize_t>(record.size());
+    return written ? std::move(file) : base::Descriptor();
 }
 
 // In the child: becomes the server, or ends with the status that a shell gives for a program that is not there.
@@ -103,20 +100,17 @@ std::string PrivateDisplay::start(const std::string& cookieFile, int& status)
 
 PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
 {
-    base::failIf(cookie_ < 0, "cannot start a display: out of file descriptors");
-    const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(cookie_);
+    base::failIf(!cookie_, "cannot start a display: out of file descriptors");
+    const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(*cookie_);
     // Two servers that start at the same moment may take the same number, and one of them ends: it looks again.
     constexpr int attempts = 4;
     int status = 0;
     std::string number;
     for (int i = 0; i < attempts && number.empty() && (i == 0 || (WIFEXITED(status) && WEXITSTATUS(status) != 127)); ++i)
         number = start(cookieFile, status);
-    if (number.empty()) {
-        ::close(cookie_);
-        const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
-        throw std::runtime_error(missing ? "no display: set DISPLAY, or install the package xvfb for --offscreen"
-                                         : "no display: DISPLAY is not set and Xvfb could not be started");
-    }
+    const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
+    base::failIf(number.empty() && missing, "no display: set DISPLAY, or install the package xvfb for --offscreen");
+    base::failIf(number.empty(), "no display: DISPLAY is not set and Xvfb could not be started");
     ::setenv("DISPLAY", (":" + number).c_str(), 1);
     ::setenv("XAUTHORITY", cookieFile.c_str(), 1);
 }
@@ -125,7 +119,6 @@ PrivateDisplay::~PrivateDisplay()
 {
     ::kill(server_, SIGTERM);
     ::waitpid(server_, nullptr, 0);
-    ::close(cookie_);
 }
 
 }  // namespace palpate::render

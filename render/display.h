@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/descriptor.h>
+
 #include <sys/types.h>
 
 #include <string>
@@ -24,7 +26,7 @@ private:
     std::string start(const std::string& cookieFile, int& status);
 
     pid_t server_ = 0;
-    int cookie_ = -1;
+    base::Descriptor cookie_;
 };
 
 }  // namespace palpate::render

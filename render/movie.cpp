@@ -24,8 +24,9 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     : file_(std::move(file)), partial_(file_.string() + ".part"), window_(window)
 {
     std::array<int, 2> ends{};
-    if (::pipe2(ends.data(), O_CLOEXEC) != 0)
-        throw base::error("{}: {}", file_.native(), std::strerror(errno));
+    base::failIf(::pipe2(ends.data(), O_CLOEXEC) != 0, "{}: {}", file_.native(), std::strerror(errno));
+    base::Descriptor from(ends[0]);
+    pipe_ = base::Descriptor(ends[1]);
     // An ffmpeg that has ended is an error of write(), and no signal.
     std::signal(SIGPIPE, SIG_IGN);
     const int* size = window.GetSize();
@@ -43,8 +44,7 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     ffmpeg.ownGroup = true;  // Ctrl-C ends this program, which then finishes the film
     const auto [pid, error] = base::start(ffmpeg);
     ffmpeg_ = pid;
-    ::close(ends[0]);
-    pipe_ = ends[1];
+    from = base::Descriptor();
     if (error != 0) {
         closeAndWait();
         throw base::error(
@@ -55,8 +55,7 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
 
 int MovieFile::closeAndWait() noexcept
 {
-    if (pipe_ >= 0)
-        ::close(std::exchange(pipe_, -1));
+    pipe_ = base::Descriptor();
     int status = 0;
     if (ffmpeg_ > 0)
         ::waitpid(std::exchange(ffmpeg_, -1), &status, 0);
@@ -80,7 +79,7 @@ void MovieFile::add(int frames)
     any_ = any_ || frames > 0;
     for (int i = 0; i < frames; ++i)
         for (std::size_t done = 0; done < size;) {
-            const ssize_t written = ::write(pipe_, bytes + done, size - done);
+            const ssize_t written = ::write(*pipe_, bytes + done, size - done);
             base::failIf(written < 0 && errno != EINTR, "{}: ffmpeg has ended (is the disk full? its message is above)",
                          file_.native());
             done += written > 0 ? static_cast<std::size_t>(written) : 0;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/descriptor.h>
+
 #include <vtkRenderWindow.h>
 
 #include <sys/types.h>
@@ -31,7 +33,7 @@ private:
     std::filesystem::path file_, partial_;
     vtkRenderWindow& window_;
     bool any_ = false;  // frames were added
-    int pipe_ = -1;
+    base::Descriptor pipe_;
     pid_t ffmpeg_ = -1;
 };
 

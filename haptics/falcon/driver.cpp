@@ -27,9 +27,7 @@ Driver::Driver(std::unique_ptr<Transport> wire, DriverOptions options, Say say, 
         guardian_ = std::make_unique<Guardian>();
     }
     link_.connect(stop);
-    if (guardian_) {
-        guardian_->guard(wire_->descriptor());
-    }
+    guard(wire_->descriptor());
     pose_.write(link_.pose());
     thread_ = std::thread([this] { run(); });
 }
@@ -40,10 +38,15 @@ Driver::~Driver()
     if (thread_.joinable()) {
         thread_.join();
     }
-    if (guardian_) {
-        guardian_->guard(-1);
-    }
+    guard(-1);
     link_.close();
+}
+
+void Driver::guard(int descriptor) noexcept
+{
+    if (guardian_) {
+        guardian_->guard(descriptor);
+    }
 }
 
 void Driver::write(Vec3 force, bool engaged) noexcept
@@ -108,25 +111,18 @@ void Driver::talk()
 bool Driver::recover()
 {
     const bool unplugged = wire_->gone();
-    if (guardian_) {
-        guardian_->guard(-1);
-    }
+    guard(-1);
     link_.rest();
     link_.close();
     const std::string what = unplugged ? "the Falcon was unplugged" : "the Falcon stopped answering";
-    if (unplugged && options_.onUnplug == OnUnplug::exit) {
-        throw Trouble(Cause::unplugged, what +
-                                            ": the force is off; plug it in and start again (--on-unplug wait goes on by "
-                                            "itself)");
-    }
+    troubleIf(unplugged && options_.onUnplug == OnUnplug::exit, Cause::unplugged,
+              "{}: the force is off; plug it in and start again (--on-unplug wait goes on by itself)", what);
     say_(what +
          (unplugged ? ": the force is off; plug it in again and the session goes on" : ": the force is off; trying again"));
     while (!stop_) {
         try {
             link_.connect(stop_);
-            if (guardian_) {
-                guardian_->guard(wire_->descriptor());
-            }
+            guard(wire_->descriptor());
             say_("the Falcon is back");
             return true;
         } catch (const Trouble& trouble) {

@@ -48,6 +48,7 @@ private:
     void run() noexcept;
     void talk();
     bool recover();
+    void guard(int descriptor) noexcept;
 
     std::unique_ptr<Transport> wire_;
     DriverOptions options_;

@@ -35,19 +35,16 @@ std::vector<std::uint8_t> collect(Transport& wire, std::size_t want, double seco
         const std::size_t n = wire.receive(part, left);
         bytes.insert(bytes.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(n));
     }
-    if (wire.gone()) {
-        throw Trouble(Cause::unplugged,
-                      "the Falcon was unplugged while its firmware was loaded: plug it in and start again");
-    }
+    troubleIf(wire.gone(), Cause::unplugged,
+              "the Falcon was unplugged while its firmware was loaded: plug it in and start again");
     return bytes;
 }
 
 void put(Transport& wire, std::span<const std::uint8_t> bytes)
 {
-    if (!wire.send(bytes)) {
-        throw Trouble(wire.gone() ? Cause::unplugged : Cause::silent,
-                      "the Falcon takes no bytes: check its cable and power supply, then plug it in again");
-    }
+    const bool sent = wire.send(bytes);
+    troubleIf(!sent, wire.gone() ? Cause::unplugged : Cause::silent,
+              "the Falcon takes no bytes: check its cable and power supply, then plug it in again");
 }
 
 // The loader's answer, with or without a zero before it.
@@ -74,11 +71,9 @@ void greet(Transport& wire)
         }
         heard = heard || !answer.empty();
     }
-    if (heard) {
-        throw Trouble(Cause::garbled,
-                      "the Falcon's loader answers with something else: plug it straight into the computer "
-                      "instead of a hub, or take another cable");
-    }
+    troubleIf(heard, Cause::garbled,
+              "the Falcon's loader answers with something else: plug it straight into the computer instead of a hub, or "
+              "take another cable");
     throw Trouble(
         Cause::silent,
         "the Falcon is there but does not answer: plug in its power supply (the lamps light up), then check the cable");
@@ -94,11 +89,10 @@ void compareEcho(std::span<const std::uint8_t> sent, std::span<const std::uint8_
     const auto at = offset + static_cast<std::size_t>(there - sent.begin());
     const std::string what =
         back == echo.end() ? std::string("did not come back") : fmt::format("came back as 0x{:02x}", *back);
-    throw Trouble(
-        Cause::garbled,
-        fmt::format("firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a "
-                    "hub, or take another cable",
-                    at + 1, total, *there, what));
+    throw Trouble(Cause::garbled,
+                  "firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a hub, or "
+                  "take another cable",
+                  at + 1, total, *there, what);
 }
 
 // What the bytes are where they cannot be a program for a processor; empty where they may be.
@@ -135,8 +129,7 @@ Firmware readFirmware(const std::filesystem::path& file)
 {
     Firmware firmware{file.string(), {}};
     const auto refuse = [&](const std::string& what) {
-        throw Trouble(Cause::firmwareFile,
-                      fmt::format("{}: {}: give the file with the Falcon's firmware", file.string(), what));
+        throw Trouble(Cause::firmwareFile, "{}: {}: give the file with the Falcon's firmware", file.string(), what);
     };
     // By its size before a byte is read: a device such as /dev/zero has no end.
     std::error_code none;
@@ -182,9 +175,7 @@ void loadFirmware(Transport& wire, const Firmware& firmware, const std::atomic<b
 
     const std::span<const std::uint8_t> image(firmware.image);
     for (std::size_t at = 0; at < image.size(); at += chunk) {
-        if (stop) {
-            throw Trouble(Cause::interrupted, "interrupted while the Falcon's firmware was loaded");
-        }
+        troubleIf(stop, Cause::interrupted, "interrupted while the Falcon's firmware was loaded");
         const auto part = image.subspan(at, std::min(chunk, image.size() - at));
         put(wire, part);
         compareEcho(part, collect(wire, part.size(), echoTime), at, image.size());

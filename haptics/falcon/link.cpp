@@ -28,9 +28,7 @@ constexpr Command waiting{{}, lampRed, false};
 
 void heed(const std::atomic<bool>& stop)
 {
-    if (stop) {
-        throw Trouble(Cause::interrupted, "interrupted while the Falcon was made ready");
-    }
+    troubleIf(stop, Cause::interrupted, "interrupted while the Falcon was made ready");
 }
 
 bool follows(const Triple& before, const Triple& after, double seconds) noexcept
@@ -74,9 +72,7 @@ void Link::connect(const std::atomic<bool>& stop)
             if (!mayPass(trouble.cause())) {
                 throw;
             }
-            if (n == attempts) {
-                throw Trouble(trouble.cause(), fmt::format("{} (tried {} times)", trouble.what(), attempts));
-            }
+            troubleIf(n == attempts, trouble.cause(), "{} (tried {} times)", trouble.what(), attempts);
             say_(fmt::format("{}: trying again ({} of {})", trouble.what(), n + 1, attempts));
             // Firmware that was loaded badly answers, but its encoders stand still.
             reload = trouble.cause() == Cause::frozen && options_.firmware.has_value();
@@ -121,11 +117,9 @@ void Link::start(bool reload, const std::atomic<bool>& stop)
     enterRunMode(wire_);
     loadedNow_ = false;
     if (reload || !answers()) {
-        if (!options_.firmware) {
-            throw Trouble(Cause::firmwareFile,
-                          "the Falcon has no firmware running (it loses it with its power supply): give the file with "
-                          "--falcon-firmware FILE");
-        }
+        troubleIf(!options_.firmware, Cause::firmwareFile,
+                  "the Falcon has no firmware running (it loses it with its power supply): give the file with "
+                  "--falcon-firmware FILE");
         say_("loading the Falcon's firmware");
         loadFirmware(wire_, *options_.firmware, stop);
         enterRunMode(wire_);
@@ -133,11 +127,8 @@ void Link::start(bool reload, const std::atomic<bool>& stop)
         const double end = wire_.now() + bootTime;
         while (!answers()) {
             heed(stop);
-            if (wire_.now() > end) {
-                throw Trouble(
-                    Cause::firmware,
-                    options_.firmware->file + ": the Falcon took every byte but does not run it: give its own firmware");
-            }
+            troubleIf(wire_.now() > end, Cause::firmware,
+                      "{}: the Falcon took every byte but does not run it: give its own firmware", options_.firmware->file);
         }
     }
     least_ = most_ = reading_.count;
@@ -156,22 +147,15 @@ void Link::homeGrip(const std::atomic<bool>& stop)
         if (send(homing) && listen(answerTime)) {
             seen = reading_.homed == allHomed ? seen + 1 : 0;
         }
-        if (wire_.gone() || wire_.now() - heard_ > silence) {
-            throw Trouble(wire_.gone() ? Cause::unplugged : Cause::silent,
-                          "the Falcon stopped answering while it was homed: check its cable and power supply");
-        }
-        if (wire_.now() > end) {
-            if (least_ == most_) {
-                throw Trouble(
-                    Cause::frozen,
-                    "the Falcon answers but its encoders stand still: switch its power supply off and on, so that "
-                    "its firmware is loaded anew");
-            }
-            throw Trouble(Cause::homing,
-                          fmt::format("the Falcon was not homed within {:.0f} s: start again and pull its grip "
-                                      "all the way out towards you",
-                                      homingTime));
-        }
+        troubleIf(wire_.gone() || wire_.now() - heard_ > silence, wire_.gone() ? Cause::unplugged : Cause::silent,
+                  "the Falcon stopped answering while it was homed: check its cable and power supply");
+        const bool over = wire_.now() > end;
+        troubleIf(over && least_ == most_, Cause::frozen,
+                  "the Falcon answers but its encoders stand still: switch its power supply off and on, so that its "
+                  "firmware is loaded anew");
+        troubleIf(over, Cause::homing,
+                  "the Falcon was not homed within {:.0f} s: start again and pull its grip all the way out towards you",
+                  homingTime);
     }
 }
 
@@ -188,15 +172,13 @@ void Link::seeEncodersMove(const std::atomic<bool>& stop)
         if (send(waiting)) {
             listen(answerTime);
         }
-        if (wire_.gone()) {
-            throw Trouble(Cause::unplugged, "the Falcon was unplugged while it was made ready: plug it in and start again");
-        }
-        if (wire_.now() > end) {
-            throw Trouble(Cause::frozen,
-                          fmt::format("of the Falcon's encoders {} of 3 moved in {:.0f} s: when its grip was moved, switch "
-                                      "its power supply off and on, so that its firmware is loaded anew",
-                                      moved(0) + moved(1) + moved(2), moveTime));
-        }
+        troubleIf(wire_.gone(), Cause::unplugged,
+                  "the Falcon was unplugged while it was made ready: plug it in and start again");
+        troubleIf(
+            wire_.now() > end, Cause::frozen,
+            "of the Falcon's encoders {} of 3 moved in {:.0f} s: when its grip was moved, switch its power supply off "
+            "and on, so that its firmware is loaded anew",
+            moved(0) + moved(1) + moved(2), moveTime);
     }
 }
 

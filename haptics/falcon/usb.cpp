@@ -1,5 +1,6 @@
 #include <haptics/falcon/usb.h>
 
+#include <base/descriptor.h>
 #include <base/error.h>
 #include <haptics/falcon/bytes.h>
 #include <haptics/falcon/guardian.h>
@@ -10,10 +11,14 @@
 #include <libusb-1.0/libusb.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <filesystem>
+#include <span>
+#include <system_error>
 #include <thread>
 
 namespace palpate::falcon {
@@ -60,11 +65,9 @@ std::string portOf(libusb_device* device)
 
 std::string boundDriver(const std::string& port)
 {
-    std::array<char, 256> target{};
+    std::error_code none;
     const std::string link = fmt::format("/sys/bus/usb/devices/{}:1.{}/driver", port, interface);
-    const ssize_t n = readlink(link.c_str(), target.data(), target.size() - 1);
-    const std::string path(target.data(), n > 0 ? static_cast<std::size_t>(n) : 0);
-    const std::string name = path.substr(path.rfind('/') + 1);
+    const std::string name = std::filesystem::read_symlink(link, none).filename();
     return name == "usbfs" ? "" : name;
 }
 
@@ -103,7 +106,7 @@ public:
     bool gone() const noexcept override { return gone_; }
     double now() const noexcept override { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
     void sleep(double seconds) noexcept override { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
-    int descriptor() const noexcept override { return descriptor_; }
+    int descriptor() const noexcept override { return *descriptor_; }
 
 private:
     struct Slot {
@@ -125,10 +128,10 @@ private:
     void restart() noexcept;
 
     Context context_;
-    int descriptor_ = -1;
+    base::Descriptor descriptor_;
     libusb_device_handle* handle_ = nullptr;
-    std::array<Slot, readers> in_;
-    std::array<Slot, writers> out_;
+    std::array<Slot, readers + writers> slots_;
+    std::span<Slot> in_ = std::span(slots_).first(readers), out_ = std::span(slots_).last(writers);
     Bytes bytes_;
     int errors_ = 0;  // of transfers in a row
     bool gone_ = false;
@@ -141,9 +144,8 @@ void UsbTransport::open()
     close();
     // A context of its own: one that lives learns of what is plugged in from udev only, where that runs.
     const auto falcons = listFalcons();
-    if (falcons.empty()) {
-        throw Trouble(Cause::absent, "no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
-    }
+    troubleIf(falcons.empty(), Cause::absent,
+              "no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
     gone_ = closing_ = stalled_ = false;
     errors_ = 0;
     bytes_.clear();
@@ -158,27 +160,21 @@ void UsbTransport::open()
 
 void UsbTransport::openNode(const UsbFalcon& falcon)
 {
-    descriptor_ = ::open(falcon.node.c_str(), O_RDWR | O_CLOEXEC);
-    if (descriptor_ < 0 && (errno == EACCES || errno == EPERM)) {
-        throw Trouble(Cause::permission, falcon.node +
-                                             ": the Falcon is there but may not be opened: run 'sudo palpate devices "
-                                             "--install-udev', then plug it in again");
-    }
-    if (descriptor_ < 0) {
-        throw Trouble(Cause::absent, fmt::format("{}: the Falcon cannot be opened ({}): plug it in again", falcon.node,
-                                                 std::strerror(errno)));
-    }
-    check(libusb_wrap_sys_device(context_, descriptor_, &handle_), "the Falcon cannot be used");
+    descriptor_ = base::Descriptor(::open(falcon.node.c_str(), O_RDWR | O_CLOEXEC));
+    const int error = descriptor_ ? 0 : errno;
+    troubleIf(error == EACCES || error == EPERM, Cause::permission,
+              "{}: the Falcon is there but may not be opened: run 'sudo palpate devices --install-udev', then plug it in "
+              "again",
+              falcon.node);
+    troubleIf(error != 0, Cause::absent, "{}: the Falcon cannot be opened ({}): plug it in again", falcon.node,
+              std::strerror(error));
+    check(libusb_wrap_sys_device(context_, *descriptor_, &handle_), "the Falcon cannot be used");
     libusb_set_auto_detach_kernel_driver(handle_, 1);
     const int claimed = libusb_claim_interface(handle_, interface);
-    if (claimed == LIBUSB_ERROR_BUSY) {
-        throw Trouble(Cause::busy, fmt::format("{}: another program uses the Falcon{}: end it", falcon.node,
-                                               falcon.driver.empty() ? "" : " (kernel driver " + falcon.driver + ")"));
-    }
-    if (claimed < 0) {
-        throw Trouble(Cause::absent, fmt::format("{}: the Falcon cannot be claimed ({}): plug it in again", falcon.node,
-                                                 libusb_strerror(static_cast<libusb_error>(claimed))));
-    }
+    troubleIf(claimed == LIBUSB_ERROR_BUSY, Cause::busy, "{}: another program uses the Falcon{}: end it", falcon.node,
+              falcon.driver.empty() ? "" : " (kernel driver " + falcon.driver + ")");
+    troubleIf(claimed < 0, Cause::absent, "{}: the Falcon cannot be claimed ({}): plug it in again", falcon.node,
+              libusb_strerror(static_cast<libusb_error>(claimed)));
 }
 
 void UsbTransport::makeSlots()
@@ -187,9 +183,7 @@ void UsbTransport::makeSlots()
         slot.owner = this;
         slot.transfer = libusb_alloc_transfer(0);
         libusb_fill_bulk_transfer(slot.transfer, handle_, endpointIn, slot.bytes.data(), usbPacket, onIn, &slot, 0);
-        if (!submit(slot)) {
-            throw Trouble(Cause::absent, "the Falcon cannot be read: plug it in again");
-        }
+        troubleIf(!submit(slot), Cause::absent, "the Falcon cannot be read: plug it in again");
     }
     for (Slot& slot : out_) {
         slot.owner = this;
@@ -249,14 +243,7 @@ void UsbTransport::onOut(libusb_transfer* transfer)
 
 bool UsbTransport::anyFlying() const noexcept
 {
-    bool any = false;
-    for (const Slot& slot : in_) {
-        any = any || slot.inFlight;
-    }
-    for (const Slot& slot : out_) {
-        any = any || slot.inFlight;
-    }
-    return any;
+    return std::ranges::any_of(slots_, &Slot::inFlight);
 }
 
 void UsbTransport::live(double seconds) noexcept
@@ -271,12 +258,9 @@ void UsbTransport::live(double seconds) noexcept
 void UsbTransport::cancelTransfers() noexcept
 {
     closing_ = true;
-    for (auto* slots : {in_.data(), out_.data()}) {
-        const std::size_t count = slots == in_.data() ? readers : writers;
-        for (std::size_t i = 0; i < count; ++i) {
-            if (slots[i].inFlight) {
-                libusb_cancel_transfer(slots[i].transfer);
-            }
+    for (const Slot& slot : slots_) {
+        if (slot.inFlight) {
+            libusb_cancel_transfer(slot.transfer);
         }
     }
     for (int i = 0; anyFlying() && i < 100; ++i) {
@@ -301,29 +285,20 @@ void UsbTransport::restart() noexcept
 void UsbTransport::close() noexcept
 {
     cancelTransfers();
-    const auto free = [](Slot& slot) {
+    for (Slot& slot : slots_) {
         // One that never came back is still the kernel's.
-        if (slot.transfer != nullptr && !slot.inFlight) {
+        if (!slot.inFlight) {
             libusb_free_transfer(slot.transfer);
         }
         slot.transfer = nullptr;
         slot.inFlight = false;
-    };
-    for (Slot& slot : in_) {
-        free(slot);
-    }
-    for (Slot& slot : out_) {
-        free(slot);
     }
     if (handle_ != nullptr) {
         libusb_release_interface(handle_, interface);
         libusb_close(handle_);
         handle_ = nullptr;
     }
-    if (descriptor_ >= 0) {
-        ::close(descriptor_);
-        descriptor_ = -1;
-    }
+    descriptor_ = base::Descriptor();
 }
 
 void UsbTransport::control(Request request, std::uint16_t value)
@@ -335,12 +310,11 @@ void UsbTransport::control(Request request, std::uint16_t value)
         gone_ = true;
         throw Trouble(Cause::unplugged, "the Falcon was unplugged while it was made ready: plug it in and start again");
     }
-    if (result < 0) {
-        throw Trouble(Cause::silent,
-                      fmt::format("the Falcon does not take its settings ({}): check its cable, plug it straight "
-                                  "into the computer instead of a hub",
-                                  libusb_strerror(static_cast<libusb_error>(result))));
-    }
+    troubleIf(
+        result < 0, Cause::silent,
+        "the Falcon does not take its settings ({}): check its cable, plug it straight into the computer instead of a "
+        "hub",
+        libusb_strerror(static_cast<libusb_error>(result)));
     // What came in before is thrown away with what the bridge held.
     if (request == Request::reset && value == bridge::purgeIn) {
         live(0.0);
