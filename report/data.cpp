@@ -1,5 +1,6 @@
 #include <report/data.h>
 
+#include <base/quantiles.h>
 #include <base/words.h>
 #include <glm/geometric.hpp>
 
@@ -19,17 +20,11 @@ constexpr std::size_t markedEvents = 200;
 constexpr std::size_t maxEntries = 500;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
-TaskTime percentiles(std::vector<float>& seconds)
+TaskTime percentiles(const std::vector<float>& seconds)
 {
-    if (seconds.empty()) {
-        return {};
-    }
-    const auto at = [&](double part) {
-        const auto place = seconds.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(seconds.size() - 1));
-        std::nth_element(seconds.begin(), place, seconds.end());
-        return static_cast<double>(*place) * 1e6;
-    };
-    return {at(0.5), at(0.99), static_cast<double>(*std::max_element(seconds.begin(), seconds.end())) * 1e6};
+    const std::vector<double> all(seconds.begin(), seconds.end());
+    const auto at = [&](double part) { return base::lowerQuantile(all, part) * 1e6; };
+    return {at(0.5), at(0.99), at(1)};
 }
 
 // Sorts ticks into bins of depth, by direction.

@@ -5,6 +5,7 @@
 #include <base/outputs.h>
 #include <base/utf8.h>
 #include <report/html.h>
+#include <report/measure_table.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -18,11 +19,6 @@ namespace {
 
 // Of a drawing [px]: the strips of dots of all groups, below them an axis.
 constexpr double plotWidth = 430, rowHeight = 18, nameWidth = 96, right = 12, axisHeight = 20;
-
-std::string number(double value, int decimals)
-{
-    return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
-}
 
 // Which colour a group has in all drawings.
 std::string colourOf(std::size_t group)
@@ -58,6 +54,17 @@ bool without(const std::vector<double>& values)
     return std::ranges::none_of(values, [](double v) { return std::isfinite(v); });
 }
 
+// Of all sessions, as printed.
+std::vector<double> allRounded(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
+{
+    std::vector<double> all;
+    for (const ScoredGroup& g : groups) {
+        const auto values = rounded(valuesOf(g, measure), measure);
+        all.insert(all.end(), values.begin(), values.end());
+    }
+    return all;
+}
+
 struct Range {
     double low = INFINITY, high = -INFINITY;
 };
@@ -65,11 +72,9 @@ struct Range {
 Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
     Range range;
-    for (const ScoredGroup& g : groups) {
-        for (const double v : rounded(valuesOf(g, measure), measure)) {
-            range.low = std::isfinite(v) ? std::min(range.low, v) : range.low;
-            range.high = std::isfinite(v) ? std::max(range.high, v) : range.high;
-        }
+    for (const double v : allRounded(groups, measure)) {
+        range.low = std::isfinite(v) ? std::min(range.low, v) : range.low;
+        range.high = std::isfinite(v) ? std::max(range.high, v) : range.high;
     }
     return range;
 }
@@ -77,11 +82,9 @@ Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& me
 // Whether no session differs from another, as printed: also not in having no value.
 bool constant(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
-    std::vector<double> all;
+    const std::vector<double> all = allRounded(groups, measure);
     std::size_t sessions = 0;
     for (const ScoredGroup& g : groups) {
-        const auto values = rounded(valuesOf(g, measure), measure);
-        all.insert(all.end(), values.begin(), values.end());
         sessions += g.sessions.size();
     }
     const bool same = std::ranges::all_of(all, [&](double v) { return v == all.front(); });
@@ -162,7 +165,7 @@ std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& 
     std::string medians, deltas;
     for (std::size_t i = 0; i < groups.size(); ++i) {
         const auto values = valuesOf(groups[i], measure);
-        const auto at = [&](double fraction) { return number(quantile(values, fraction), decimals); };
+        const auto at = [&](double fraction) { return cell(quantile(values, fraction), decimals); };
         medians += fmt::format("<div><i style=\"background:{}\"></i>{}: {}</div>", colourOf(i), escape(groups[i].name),
                                quartilesText(at(0.5), at(0.25), at(0.75)));
     }
@@ -252,7 +255,7 @@ std::string groupsPart(const std::vector<ScoredGroup>& groups)
         const auto values = valuesOf(groups[0], m);
         const double value = values.empty() ? INFINITY : values[0];
         same += fmt::format("{}{} {}", same.empty() ? "" : ", ", titleOf(m),
-                            std::isfinite(value) ? number(value, m.decimals) : "without a value");
+                            std::isfinite(value) ? cell(value, m.decimals) : "without a value");
     }
     std::string body =
         "<header><div><h1>Groups compared</h1><p class=\"key\">" + names +

@@ -149,13 +149,24 @@ std::string embedded(const nlohmann::json& data)
     std::string out;
     out.reserve(text.size());
     for (const char c : text) {
-        if (c == '<') {
-            out += "\\u003c";
-        } else {
-            out += c;
-        }
+        out += c == '<' ? std::string_view("\\u003c") : std::string_view(&c, 1);
     }
     return out;
+}
+
+nlohmann::json numbers(const std::vector<double>& values)
+{
+    nlohmann::json out = nlohmann::json::array();
+    for (const double v : values) {
+        out.push_back(std::isfinite(v) ? nlohmann::json(std::round(v * 1e4) / 1e4) : nlohmann::json());
+    }
+    return out;
+}
+
+nlohmann::json axis(std::string_view name, std::string_view unit)
+{
+    return {
+        {"name", name}, {"unit", unit}, {"label", unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit)}};
 }
 
 std::string page(std::string_view title, std::string_view body, const nlohmann::json& data)

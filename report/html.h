@@ -10,6 +10,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace palpate::report {
 
@@ -18,6 +19,12 @@ std::string escape(std::string_view text);
 
 /// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
 std::string embedded(const nlohmann::json& data);
+
+/// The numbers of a chart: four decimals are under a tenth of what it can show, and halve the page. What is not finite is
+/// null.
+nlohmann::json numbers(const std::vector<double>& values);
+/// An axis of a chart: "force [N]".
+nlohmann::json axis(std::string_view name, std::string_view unit);
 
 /// A whole page that needs no other file: `body` between the style and the scripts that draw data["charts"], each in the
 /// place that chartCard() made for its key.

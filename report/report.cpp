@@ -1,5 +1,6 @@
 #include <report/report.h>
 
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/spoken.h>
 #include <datasets/scene.h>
@@ -11,7 +12,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <limits>
 #include <optional>
@@ -26,25 +26,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t shownVitals = 7;  // at first; the legend switches the others on
-
-// Four decimals are under a tenth of what a chart can show, and halve the page.
-json columnsOf(const std::vector<std::vector<double>>& columns)
-{
-    json out = json::array();
-    for (const std::vector<double>& column : columns) {
-        json values = json::array();
-        for (const double v : column) {
-            values.push_back(std::isfinite(v) ? json(std::round(v * 1e4) / 1e4) : json());
-        }
-        out.push_back(std::move(values));
-    }
-    return out;
-}
-
-json axis(std::string_view name, std::string_view unit)
-{
-    return {{"name", name}, {"unit", unit}, {"label", std::string(name) + " [" + std::string(unit) + "]"}};
-}
 
 // Nothing where the scene cannot be read.
 std::optional<double> capOf(const haptics::SessionInfo& info)
@@ -66,7 +47,7 @@ json capLine(const ReportData& d, std::optional<double> cap)
 // The colours of the viewer (render/overlay.h): blue, violet, green.
 json forceChart(const ReportData& d, std::optional<double> cap)
 {
-    return {{"columns", columnsOf(d.forces)},
+    return {{"columns", base::mapped<json>(d.forces, numbers)},
             {"x", axis("time", "s")},
             {"y", axis("force", "N")},
             {"sync", "time"},
@@ -88,21 +69,22 @@ void bridgeGaps(json& chart)
 
 json depthChart(const ReportData& d, std::optional<double> cap)
 {
-    json chart = {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
-                  {"x", axis("inserted", "mm")},
-                  {"y", axis("total force", "N")},
-                  {"lines", capLine(d, cap)},
-                  {"series",
-                   {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
-                    {{"label", "going in, largest"}, {"colour", "c6"}},
-                    {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
+    json chart = {
+        {"columns", base::mapped<json>(std::vector{d.profile.depth, d.profile.in, d.profile.peak, d.profile.out}, numbers)},
+        {"x", axis("inserted", "mm")},
+        {"y", axis("total force", "N")},
+        {"lines", capLine(d, cap)},
+        {"series",
+         {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
+          {{"label", "going in, largest"}, {"colour", "c6"}},
+          {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
     bridgeGaps(chart);
     return chart;
 }
 
 json energyChart(const ReportData& d)
 {
-    return {{"columns", columnsOf(d.energy)},
+    return {{"columns", base::mapped<json>(d.energy, numbers)},
             {"x", axis("time", "s")},
             {"y", axis("energy", "mJ")},
             {"sync", "time"},
@@ -163,7 +145,7 @@ json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
             lines.push_back({{"at", warning}, {"label", "warning: " + name}, {"colour", colour}});
         }
     }
-    return {{"columns", columnsOf(d.distances)},
+    return {{"columns", base::mapped<json>(d.distances, numbers)},
             {"x", axis("time", "s")},
             {"y", axis("distance", "mm")},
             {"sync", "time"},
@@ -176,7 +158,7 @@ json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
 json nearestChart(const ReportData& d, const haptics::SessionInfo& info)
 {
     json chart = distanceChart(d, info);
-    chart["columns"] = columnsOf(d.nearest);
+    chart["columns"] = base::mapped<json>(d.nearest, numbers);
     chart["x"] = axis("inserted", "mm");
     chart["y"] = axis("least distance", "mm");
     chart.erase("sync");

@@ -21,7 +21,7 @@
 namespace palpate::training {
 
 using nlohmann::json;
-using report::escape;
+using report::axis, report::escape, report::numbers;
 
 namespace {
 
@@ -30,11 +30,6 @@ const haptics::Measure& measureCalled(std::string_view key)
     const auto all = haptics::measures();
     const auto at = std::ranges::find(all, key, &haptics::Measure::key);
     return at == all.end() ? all.front() : *at;
-}
-
-json number(double v)
-{
-    return std::isfinite(v) ? json(std::round(v * 1e4) / 1e4) : json();
 }
 
 json trialNumbers(std::size_t count)
@@ -87,18 +82,10 @@ std::string whyNoValue(const Exercise& exercise, const haptics::Measure& m)
     return words;
 }
 
-json axis(std::string_view name, std::string_view unit)
-{
-    return {
-        {"name", name}, {"unit", unit}, {"label", unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit)}};
-}
-
 json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
 {
-    json y = json::array();
-    for (const StoredSession& s : p.sessions) {
-        y.push_back(number(valueIn(s.values, m.key)));
-    }
+    const json y = numbers(
+        base::mapped<double>(p.sessions, [&](const StoredSession& session) { return valueIn(session.values, m.key); }));
     return {{"columns", json::array({trialNumbers(p.sessions.size()), y})},
             {"x", axis("session", "")},
             {"y", {{"name", m.label}, {"unit", m.unit}, {"label", *m.unit == 0 ? "number" : m.unit}}},
@@ -110,11 +97,8 @@ json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
 
 json cusumChart(const ExerciseProgress& p, const CusumPlan& plan)
 {
-    json alarm = json::array(), learning = json::array();
-    for (const CusumPoint& point : p.chart) {
-        alarm.push_back(number(point.alarm));
-        learning.push_back(number(point.learning));
-    }
+    const json alarm = numbers(base::mapped<double>(p.chart, &CusumPoint::alarm)),
+               learning = numbers(base::mapped<double>(p.chart, &CusumPoint::learning));
     return {{"columns", json::array({trialNumbers(p.chart.size()), alarm, learning})},
             {"x", axis("session", "")},
             {"y", axis("CUSUM", "")},
