@@ -77,13 +77,9 @@ std::uint64_t ticksOf(const Record& record, const std::string& file)
 // The servo loop's result; a session that was cut off has none.
 std::uint64_t missedIn(const Record& record)
 {
-    for (const auto& [key, value] : record.results()) {
-        std::uint64_t missed = 0;
-        if (key == "missed_ticks" && std::from_chars(value.data(), value.data() + value.size(), missed).ec == std::errc()) {
-            return missed;
-        }
-    }
-    return render::notCounted;
+    const std::string said = record.result("missed_ticks");
+    std::uint64_t missed = 0;
+    return std::from_chars(said.data(), said.data() + said.size(), missed).ec == std::errc() ? missed : render::notCounted;
 }
 
 }  // namespace

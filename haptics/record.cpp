@@ -340,4 +340,11 @@ std::vector<std::pair<std::string, std::string>> Record::results() const
     return pairs;
 }
 
+std::string Record::result(std::string_view key) const
+{
+    const auto all = results();
+    const auto found = std::ranges::find(all, key, &std::pair<std::string, std::string>::first);
+    return found != all.end() ? found->second : "";
+}
+
 }  // namespace palpate::haptics

@@ -40,16 +40,6 @@ private:
     std::optional<std::uint64_t> first_;
 };
 
-std::string resultOf(const Record& record, std::string_view key)
-{
-    for (const auto& [name, value] : record.results()) {
-        if (name == key) {
-            return value;
-        }
-    }
-    return {};
-}
-
 std::string sealInWords(const Seal& seal, int format)
 {
     switch (seal.state) {
@@ -112,12 +102,12 @@ RecordCheck checkRecord(const Record& record, std::string_view build)
         scorer.add(tick);
     });
     warn(continuity.inWords());
-    const std::string forces = resultOf(record, "force_hash"), now = fmt::format("{:016x}", hash.value());
+    const std::string forces = record.result("force_hash"), now = fmt::format("{:016x}", hash.value());
     if (!forces.empty() && forces != now && continuity.whole()) {
         warn(fmt::format("its forces have the hash {}, and {} at the session's end", now, forces));
     }
     const bool sameBuild = record.info().build == build;
-    const std::string total = resultOf(record, "score_total"), again = fmt::format("{:.1f}", scorer.score().total);
+    const std::string total = record.result("score_total"), again = fmt::format("{:.1f}", scorer.score().total);
     if (sameBuild && !total.empty() && total != again) {
         warn(fmt::format("its total is {} by its ticks, and was {} at the session's end", again, total));
     }

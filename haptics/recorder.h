@@ -96,6 +96,8 @@ public:
     /// Calls `visit` for every tick in order, with events and cores filled in.
     void each(const std::function<void(const TickRecord&)>& visit) const;
     std::vector<std::pair<std::string, std::string>> results() const;
+    /// Of one key; empty where there is none.
+    std::string result(std::string_view key) const;
 
 private:
     struct Impl;

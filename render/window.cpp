@@ -29,15 +29,10 @@
 namespace palpate::render {
 namespace {
 
-struct WindowCloser {
-    void operator()(GLFWwindow* window) const noexcept
-    {
-        if (window != nullptr)
-            glfwDestroyWindow(window);
-        glfwTerminate();
-    }
-};
-using Window = std::unique_ptr<GLFWwindow, WindowCloser>;
+using Window = std::unique_ptr<GLFWwindow, decltype([](GLFWwindow* window) {
+                                   glfwDestroyWindow(window);
+                                   glfwTerminate();
+                               })>;
 
 Window openWindow(const ViewerOptions& options)
 {

@@ -119,15 +119,9 @@ std::string outcome(const ReportData& d, const haptics::Record& record)
 // What the servo loop said about its own punctuality, where it did.
 std::string lateness(const haptics::Record& record)
 {
-    std::string text;
-    for (const auto& [key, value] : record.results()) {
-        if (key == "missed_ticks") {
-            text += " Missed ticks: " + escape(value) + ".";
-        } else if (key == "lateness_us_p99") {
-            text += " Late by at most " + escape(value) + " &micro;s in 99 % of them.";
-        }
-    }
-    return text;
+    const std::string missed = record.result("missed_ticks"), late = record.result("lateness_us_p99");
+    return (missed.empty() ? "" : " Missed ticks: " + escape(missed) + ".") +
+           (late.empty() ? "" : " Late by at most " + escape(late) + " &micro;s in 99 % of them.");
 }
 
 }  // namespace

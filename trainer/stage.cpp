@@ -25,16 +25,10 @@ using base::tr;
 
 namespace {
 
-struct WindowCloser {
-    void operator()(GLFWwindow* window) const noexcept
-    {
-        if (window != nullptr) {
-            glfwDestroyWindow(window);
-        }
-        glfwTerminate();
-    }
-};
-using Window = std::unique_ptr<GLFWwindow, WindowCloser>;
+using Window = std::unique_ptr<GLFWwindow, decltype([](GLFWwindow* window) {
+                                   glfwDestroyWindow(window);
+                                   glfwTerminate();
+                               })>;
 
 Window openWindow(int width, int height)
 {
