@@ -1,5 +1,7 @@
 #include <haptics/display_image.h>
 
+#include <haptics/scenery.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -7,7 +9,6 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <string_view>
 #include <utility>
 
 namespace palpate::haptics {
@@ -17,13 +18,6 @@ namespace {
 using channel::GreyWindow;
 
 constexpr double around = 30e-3;  // of the aim [m]
-
-channel::Name nameOf(std::string_view text) noexcept
-{
-    channel::Name name{};
-    std::copy_n(text.begin(), std::min(text.size(), name.size() - 1), name.begin());
-    return name;
-}
 
 // What radiologists look at CT through: OHIF's presets, width and level 400 40, 1500 -600, 2500 480
 // (defaultWindowLevelPresets.ts of OHIF/Viewers).
@@ -50,7 +44,7 @@ std::vector<float> valuesAround(const volume::NodeGrid& grid, const std::vector<
 }
 
 // Nearest rank; takes the values to pieces.
-GreyWindow percentiles(std::string_view name, std::vector<float> values)
+GreyWindow percentiles(const std::string& name, std::vector<float> values)
 {
     const auto at = [&](double fraction) {
         const auto rank = static_cast<std::ptrdiff_t>(std::llround(fraction * static_cast<double>(values.size() - 1)));

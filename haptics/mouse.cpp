@@ -1,5 +1,6 @@
 #include <haptics/mouse.h>
 
+#include <channel/deformation.h>
 #include <haptics/bounded.h>
 
 #include <glm/geometric.hpp>
@@ -12,16 +13,13 @@ namespace palpate::haptics {
 
 namespace {
 
-Vec3 vec(const channel::Triple& t) noexcept
-{
-    return {t[0], t[1], t[2]};
-}
+using channel::vec;
 
 // What another program wrote may be anything.
 bool isSound(const channel::Input& input) noexcept
 {
     return glm::length(vec(input.target)) < 10.0 && std::abs(glm::length(vec(input.axis)) - 1.0) < 1e-3 &&
-           std::all_of(input.probe.begin(), input.probe.end(), [](double v) { return std::abs(v) <= 1.0; });
+           std::ranges::all_of(input.probe, [](double v) { return std::abs(v) <= 1.0; });
 }
 
 }  // namespace

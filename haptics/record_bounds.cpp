@@ -23,28 +23,24 @@ void checkName(const char* what, const std::string& text)
 {
     const bool control =
         std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-    base::failIf(text.size() > longestName || control, "{}",
-                 control ? fmt::format("{} has control characters", what)
-                         : fmt::format("{} has {} bytes: {} at most", what, text.size(), longestName));
+    base::failIf(control, "{} has control characters", what);
+    base::failIf(text.size() > longestName, "{} has {} bytes: {} at most", what, text.size(), longestName);
 }
 
 struct Bounds {
     const TickRecord& tick;
 
-    [[noreturn]] void refuse(const std::string& what) const { throw base::error("tick {}: {}", tick.tick, what); }
-
     void within(const char* what, double value, double low, double high) const
     {
-        if (!(value >= low && value <= high)) {  // also catches what is not a number
-            refuse(fmt::format("{} is {:g}, outside {:g} to {:g}", what, value, low, high));
-        }
+        // The negation also catches what is not a number.
+        base::failIf(!(value >= low && value <= high), "tick {}: {} is {:g}, outside {:g} to {:g}", tick.tick, what, value,
+                     low, high);
     }
 
     void row(const char* what, std::size_t index, std::size_t count) const
     {
-        if (index >= std::max<std::size_t>(count, 1)) {
-            refuse(fmt::format("{} is {}, and the session has {}", what, index, count));
-        }
+        base::failIf(index >= std::max<std::size_t>(count, 1), "tick {}: {} is {}, and the session has {}", tick.tick, what,
+                     index, count);
     }
 
     void optionalRow(const char* what, std::uint8_t index, std::size_t count) const
@@ -111,9 +107,8 @@ void checkTick(const TickRecord& t, const SessionInfo& info)
     check.optionalRow("nearest_vital", t.nearestVital, structures);
     check.optionalRow("warned", t.warned, structures);
     for (std::size_t i = 0; i < structures && i < maxStructures; ++i) {
-        if (!t.faulted && (std::isnan(t.distance[i]) || std::isnan(t.ahead.structure[i]))) {
-            check.refuse(fmt::format("the distance to structure {} is not a number", i));
-        }
+        base::failIf(!t.faulted && (std::isnan(t.distance[i]) || std::isnan(t.ahead.structure[i])),
+                     "tick {}: the distance to structure {} is not a number", t.tick, i);
     }
     for (const float seconds : t.seconds) {
         check.within("the time of a task [s]", static_cast<double>(seconds), 0, longestTask);

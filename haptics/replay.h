@@ -68,6 +68,7 @@ private:
     int format_;
     std::vector<std::string> tissues_;
     std::vector<Difference> differences_;
+    std::uint64_t count_ = 0;  // of all differences, tick by tick
 };
 
 /// What a replay found.
