@@ -4,7 +4,6 @@
 
 #include <cstdio>
 #include <exception>
-#include <memory>
 
 using namespace palpate;
 
@@ -14,8 +13,7 @@ bool press()
 {
     auto scene = *datasets::builtInScene("block");
     const double radius = scene.tool.radius;
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    const auto model = haptics::buildModel(std::move(scene), std::move(tissue));
+    const auto model = haptics::buildModel(std::move(scene));
     haptics::Simulation simulation(model);
 
     // The front of the block is y = 0, its inside y > 0. The position is that of the ball's middle.

@@ -207,4 +207,10 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
             std::move(elastic), std::move(structures), posture.figures};
 }
 
+SessionModel buildModel(datasets::Scene scene, bool isSession)
+{
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    return buildModel(std::move(scene), std::move(tissue), isSession);
+}
+
 }  // namespace palpate::haptics

@@ -43,5 +43,7 @@ struct SessionModel {
 /// @param isSession  a session needs a way to the target, and may step down to ChainMail: a tool that holds too many nodes
 ///                   for a tick is refused. What is none (palpate press) has approach.isPlanned false where there is no way
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession = true);
+/// Loads or makes the volume that the scene names first.
+SessionModel buildModel(datasets::Scene scene, bool isSession = true);
 
 }  // namespace palpate::haptics

@@ -69,12 +69,10 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
                      "computed",
                      file, next);
         const haptics::TickRecord& now = simulation.tick(then.device);
-        if (!comparison.add(then, now)) {
-            throw base::error(
-                "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was "
-                "changed: {}",
-                file, next, record.info().build, comparison.inWords());
-        }
+        base::failIf(
+            !comparison.add(then, now),
+            "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was changed: {}", file,
+            next, record.info().build, comparison.inWords());
         if (each) {
             each(now);
         }

@@ -82,8 +82,7 @@ haptics::SessionModel smallBody(const std::string& setting, const TissueLoad& lo
         scene.probe.kind = datasets::ProbeKind::linear;
         scene.probe.face = {0, 0, probeAside};
     }
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    return haptics::buildModel(std::move(scene), std::move(tissue));
+    return haptics::buildModel(std::move(scene));
 }
 
 std::string processor()

@@ -82,19 +82,13 @@ void change(Scene& scene, const SceneChanges& changes)
     if (changes.dffb) {
         changeDffb(scene.dffb, *changes.dffb, changes.trial);
     }
-    if (changes.arm) {
-        scene.device = *changes.arm;
-    }
+    scene.device = changes.arm.value_or(scene.device);
     scene.source.inserts.insert(scene.source.inserts.end(), changes.inserts.begin(), changes.inserts.end());
     if (changes.palpate) {
         palpated(scene);
     }
-    if (changes.target) {
-        scene.target = *changes.target;
-    }
-    if (changes.seed) {
-        scene.source.phantom.seed = *changes.seed;
-    }
+    scene.target = changes.target.value_or(scene.target);
+    scene.source.phantom.seed = changes.seed.value_or(scene.source.phantom.seed);
     if (changes.voxelsPerSide) {
         scene.source.phantom.numbers["voxels_per_side"] = *changes.voxelsPerSide;
     }
@@ -125,10 +119,8 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
     base::failIf(!scene.source.file.empty() && (idleSeed || changes.voxelsPerSide),
                  "{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels");
     change(scene, changes);
-    if (changes.setting && scene.model.level != datasets::ModelLevel::elastic) {
-        throw base::error("{}: the tissue model is {}: --setting changes nothing; add --model elastic", origin,
-                          levelOf(scene));
-    }
+    base::failIf(changes.setting && scene.model.level != datasets::ModelLevel::elastic,
+                 "{}: the tissue model is {}: --setting changes nothing; add --model elastic", origin, levelOf(scene));
     Scene again = datasets::parseScene(datasets::sceneText(scene), origin);
     again.tissueChanges = scene.tissueChanges;  // the same, with their lines in the file
     if (changes.tool) {
@@ -146,9 +138,8 @@ Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissu
 
 volume::Tissue loadVolume(const std::filesystem::path& file)
 {
-    if (std::error_code none; std::filesystem::is_directory(file, none)) {
-        throw base::error("{}: is a folder: give a volume (.vdb)", file.native());
-    }
+    std::error_code none;
+    base::failIf(std::filesystem::is_directory(file, none), "{}: is a folder: give a volume (.vdb)", file.native());
     return volume::Tissue::load(file);
 }
 
@@ -198,10 +189,9 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
         model.approach.isPlanned = model.approach.isPlanned && aims;
         return model;
     }
-    if (changes.lesion) {
-        throw base::error("{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it",
-                          what, changes.lesion->from.string());
-    }
+    base::failIf(changes.lesion.has_value(),
+                 "{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it", what,
+                 changes.lesion ? changes.lesion->from.string() : "");
     auto builtIn = datasets::builtInScene(what);
     std::error_code none;
     base::failIf(!builtIn && std::filesystem::is_directory(path, none),
@@ -209,31 +199,25 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     if (!builtIn && std::filesystem::is_symlink(path, none) && !std::filesystem::exists(path, none)) {
         throw base::error("{}: {}", what, base::whyNoFile(path));
     }
-    if (!builtIn && !std::filesystem::exists(path, none)) {
-        throw base::error("{}: no such scene or volume; built-in scenes are: {}", what,
-                          fmt::join(datasets::builtInScenes(), ", "));
-    }
+    base::failIf(!builtIn && !std::filesystem::exists(path, none), "{}: no such scene or volume; built-in scenes are: {}",
+                 what, fmt::join(datasets::builtInScenes(), ", "));
     if (!builtIn) {
         refuseNoScene(path);
     }
     auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
     scene.source.phantom.memory = changes.memory;
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    return haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
+    return haptics::buildModel(std::move(scene), !changes.tool);
 }
 
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
 {
-    auto scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    auto model = haptics::buildModel(std::move(scene), std::move(tissue));
+    auto model = haptics::buildModel(datasets::parseScene(info.sceneText, info.sceneOrigin));
     base::failIf(haptics::modelHash(model) != info.volumeHash,
                  "{}: the volume or the tissue table of this session has changed since it was recorded; replay it with "
                  "those it was recorded with",
                  file);
-    if (const std::string contradiction = haptics::contradictionIn(info, model); !contradiction.empty()) {
-        throw base::error("{}: was changed: {}", file, contradiction);
-    }
+    const std::string contradiction = haptics::contradictionIn(info, model);
+    base::failIf(!contradiction.empty(), "{}: was changed: {}", file, contradiction);
     return model;
 }
 
