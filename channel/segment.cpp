@@ -23,6 +23,12 @@ std::string segmentName(const std::string& session)
     return "/palpate-" + session;
 }
 
+std::uint64_t layoutHash() noexcept
+{
+    return PALPATE_LAYOUT + sizeof(Header) + sizeof(Scenery) + sizeof(StateBlock) + sizeof(InputBlock) +
+           sizeof(DisplacedBlock);
+}
+
 base::Descriptor openSegment(const std::string& name, int access) noexcept
 {
     base::Descriptor file(::shm_open(name.c_str(), access | O_NONBLOCK, 0));

@@ -69,87 +69,8 @@ struct DisplacedBlock {
     std::array<DisplacedSlot, displacedSlots> slot;
 };
 
-/// FNV-1a over what a reader compiled elsewhere must agree on.
-constexpr std::uint64_t layoutHash() noexcept
-{
-    std::uint64_t hash = 14695981039346656037ULL;
-    for (const std::size_t value : {sizeof(Header),
-                                    sizeof(Grid),
-                                    sizeof(TissueLook),
-                                    sizeof(GreyWindow),
-                                    sizeof(TissueSound),
-                                    sizeof(ProbePose),
-                                    sizeof(Hole),
-                                    sizeof(Scenery),
-                                    sizeof(State),
-                                    sizeof(Input),
-                                    sizeof(Displacement),
-                                    sizeof(StateBlock),
-                                    sizeof(InputBlock),
-                                    sizeof(DisplacedSlot),
-                                    sizeof(DisplacedBlock),
-                                    maxTissues,
-                                    maxStructures,
-                                    maxWindows,
-                                    maxDisplaced,
-                                    nameLength,
-                                    displacedSlots,
-                                    offsetof(Header, imageOffset),
-                                    offsetof(Header, ownerPid),
-                                    offsetof(Header, closed),
-                                    offsetof(Grid, origin),
-                                    offsetof(Grid, spacing),
-                                    offsetof(TissueLook, colour),
-                                    offsetof(TissueLook, opacity),
-                                    offsetof(Scenery, lattice),
-                                    offsetof(Scenery, tissues),
-                                    offsetof(Scenery, tissue),
-                                    offsetof(Scenery, structure),
-                                    offsetof(Scenery, warnDistance),
-                                    offsetof(Scenery, tool),
-                                    offsetof(Scenery, toolRadius),
-                                    offsetof(Scenery, entry),
-                                    offsetof(Scenery, aim),
-                                    offsetof(Scenery, forceCap),
-                                    offsetof(Scenery, throwLength),
-                                    offsetof(Scenery, window),
-                                    offsetof(Scenery, imageUnit),
-                                    offsetof(Scenery, imageLow),
-                                    offsetof(Scenery, sound),
-                                    offsetof(Scenery, fine),
-                                    offsetof(Scenery, probe),
-                                    offsetof(Scenery, holeRadius),
-                                    offsetof(State, time),
-                                    offsetof(State, tip),
-                                    offsetof(State, bend),
-                                    offsetof(State, proxy),
-                                    offsetof(State, basic),
-                                    offsetof(State, total),
-                                    offsetof(State, phase),
-                                    offsetof(State, warning),
-                                    offsetof(State, tissue),
-                                    offsetof(State, inserted),
-                                    offsetof(State, distance),
-                                    offsetof(State, ahead),
-                                    offsetof(State, aheadTissue),
-                                    offsetof(State, coreTarget),
-                                    offsetof(State, probe),
-                                    offsetof(State, standing),
-                                    offsetof(State, hole),
-                                    offsetof(State, missed),
-                                    offsetof(State, published),
-                                    offsetof(Input, axis),
-                                    offsetof(Input, probe),
-                                    offsetof(Input, held),
-                                    offsetof(Input, fires),
-                                    offsetof(Input, pictures),
-                                    offsetof(Input, paused),
-                                    offsetof(Input, beat),
-                                    offsetof(Displacement, u)})
-        for (int byte = 0; byte < 8; ++byte)
-            hash = (hash ^ ((value >> (8 * byte)) & 0xFF)) * 1099511628211ULL;
-    return hash;
-}
+/// What a reader compiled elsewhere must agree on: the source of this layout (CMakeLists.txt) and its sizes.
+std::uint64_t layoutHash() noexcept;
 
 /// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.
 std::string segmentName(const std::string& session);
