@@ -203,10 +203,9 @@ double expectedSignals(const CusumPlan& plan, const Gate& gate, const LearningLa
 CourseCheck checkCourses(const Curriculum& curriculum, int people, std::uint64_t seed, int most)
 {
     for (const Exercise& e : curriculum.exercises) {
-        if (e.gate.of > longestWindow) {
-            throw base::error("exercise {}: its gate looks at the last {} sessions; verify follows {} at most", e.id,
-                              e.gate.of, longestWindow);
-        }
+        base::failIf(e.gate.of > longestWindow,
+                     "exercise {}: its gate looks at the last {} sessions; verify follows {} at most", e.id, e.gate.of,
+                     longestWindow);
     }
     CourseCheck check;
     for (const LearningLaw& law : learningLaws()) {

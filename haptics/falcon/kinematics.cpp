@@ -50,11 +50,6 @@ LegView viewOf(Vec3 position, const Frame& frame) noexcept
     return view;
 }
 
-bool reaches(Vec3 position, const Frame& frame) noexcept
-{
-    return std::abs(glm::dot(position, frame.tangent) - delta.s + delta.f) < widestSide * delta.b;
-}
-
 // How far the leg is from closing [m], and its derivatives.
 struct Closure {
     double gap = 0;
@@ -107,27 +102,6 @@ bool plausible(Vec3 p) noexcept
 }
 
 }  // namespace
-
-std::optional<Angles> anglesAt(Vec3 position) noexcept
-{
-    Angles angles{};
-    for (std::size_t leg = 0; leg < 3; ++leg) {
-        const Frame frame = frameOf(leg);
-        if (!reaches(position, frame)) {
-            return std::nullopt;
-        }
-        const LegView view = viewOf(position, frame);
-        const double reach = std::hypot(view.across, view.height);
-        const double cosine =
-            (reach * reach + delta.a * delta.a - view.shin * view.shin) / (2.0 * delta.a * std::max(reach, 1e-9));
-        // The negation also catches what is not a number.
-        if (!(std::abs(cosine) <= 1.0)) {
-            return std::nullopt;
-        }
-        angles[leg] = std::atan2(view.height, view.across) - std::acos(cosine);
-    }
-    return angles;
-}
 
 std::optional<Vec3> positionAt(const Angles& angles, Vec3 near) noexcept
 {
@@ -188,16 +162,6 @@ Angles anglesOf(const Triple& count) noexcept
         angles[i] = zeroAngle + radPerCount * count[i];
     }
     return angles;
-}
-
-Triple countsAt(const Angles& angles) noexcept
-{
-    Triple count{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        count[i] =
-            static_cast<std::int16_t>(std::clamp(std::lround((angles[i] - zeroAngle) / radPerCount), -32768L, 32767L));
-    }
-    return count;
 }
 
 Triple motorCommand(const Torques& torques) noexcept

@@ -33,10 +33,6 @@ inline constexpr double homedDepth = 0.17;  // z beyond which every encoder has 
 /// How far from singular a pose is: below `singular` no torque is to be trusted.
 inline constexpr double singular = 0.1, wellPosed = 0.25;
 
-/// The arms' angles that put the grip at a position (inverse kinematics, in closed form, elbows outside); nothing where the
-/// legs do not reach.
-std::optional<Angles> anglesAt(Vec3 position) noexcept;
-
 /// Where the grip is (forward kinematics), by Newton's method to 1e-12 m; nothing where it does not converge. `near`: where
 /// to look first.
 std::optional<Vec3> positionAt(const Angles& angles, Vec3 near = Vec3(0.0, 0.0, 0.13)) noexcept;
@@ -64,7 +60,6 @@ inline constexpr double countsPerTorque = 10000.0;                          // o
 inline constexpr int largestCommand = 4096;                                 // either sign
 
 Angles anglesOf(const Triple& count) noexcept;
-Triple countsAt(const Angles& angles) noexcept;
 
 /// Motor commands have the opposite sign of torques. Where one would be over the largest command all are scaled together,
 /// so that the force keeps its direction. Torques that are not finite give none.

@@ -1,6 +1,7 @@
 #include <tests/falcon/emulator.h>
 
 #include <haptics/bounded.h>
+#include <tests/falcon/inverse.h>
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,7 @@
 #include <haptics/falcon/kinematics.h>
 #include <haptics/motion.h>
 #include <tests/allocations.h>
+#include <tests/falcon/inverse.h>
 
 #include <gtest/gtest.h>
 
