@@ -5,6 +5,7 @@
 
 #include <boost/lockfree/spsc_queue.hpp>
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/stat.h>
