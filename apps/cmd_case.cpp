@@ -40,7 +40,7 @@ struct CaseArguments {
     training::NewCase made;
 };
 
-nlohmann::json caseFigures(const Case& c)
+nlohmann::json figuresOfCase(const Case& c)
 {
     return {{"id", c.id},
             {"title", c.title},
@@ -58,7 +58,7 @@ nlohmann::json caseFigures(const Case& c)
 void list(const CaseArguments& o)
 {
     const auto all = listed("cases", training::allCases);
-    command::writeJson(o.json, {{"cases", base::mapped<nlohmann::json>(all, caseFigures)}});
+    command::writeJson(o.json, {{"cases", base::mapped<nlohmann::json>(all, figuresOfCase)}});
     if (o.json != "-") {
         fmt::print("{:<22} {:<10}  {}\n", "case", "difficulty", "title: what it trains");
         for (const Case& c : all) {
@@ -71,7 +71,7 @@ void list(const CaseArguments& o)
 void show(const CaseArguments& o)
 {
     const Case c = training::findCase(o.id);
-    command::writeJson(o.json, caseFigures(c));
+    command::writeJson(o.json, figuresOfCase(c));
     if (o.json == "-") {
         return;
     }
