@@ -239,9 +239,8 @@ Person ProfileStore::find(const std::string& name) const
 
 void ProfileStore::setHand(const Person& person, Hand hand)
 {
-    guarded(file_, [&] {
-        Statement(*database_, "UPDATE person SET hand = ? WHERE id = ?", nameOf(hand), person.id).run();
-    });
+    guarded(file_,
+            [&] { Statement(*database_, "UPDATE person SET hand = ? WHERE id = ?", nameOf(hand), person.id).run(); });
 }
 
 std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
