@@ -24,8 +24,8 @@ SHOWN = re.compile(
 )
 THROUGH = re.compile(r"\b(?:tr|marked)\(\s*$|\btrn\(\s*(?:" + LITERAL + r"\s*,\s*)?$")
 # For programmers and files, not for the window.
-APART = re.compile(r"(?:(?:runtime_error|base::error|base::failIf)\([^;]*|addBench\(|extern |PushID\(|BeginChild\(|BeginTable\(|return \{\"--|text \+= [^;]*"
-                   r"|std::pair\{\w+, |, title\] : \{[^;]*)$")
+APART = re.compile(r"(?:(?:runtime_error|base::error|base::failIf)\([^;]*|addBench\(|extern |PushID\(|BeginChild\(|"
+                   r"BeginTable\(|return \{\"--|text \+= [^;]*|std::pair\{\w+, |, title\] : \{[^;]*)$")
 
 
 def faults_in(file):
