@@ -103,10 +103,9 @@ void runPhantom(PhantomArguments& options)
         }
         return;
     }
-    if (options.spec.name.empty() || options.output.empty()) {
-        throw base::error("phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
-                          fmt::join(datasets::phantomNames(), ", "));
-    }
+    base::failIf(options.spec.name.empty() || options.output.empty(),
+                 "phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
+                 fmt::join(datasets::phantomNames(), ", "));
     base::checkNames({options.output});
     base::checkOutputs({options.output, options.json}, {options.tissues});
     options.spec.voxel = options.voxel * 1e-3;

@@ -81,11 +81,9 @@ void erase(const ProfileArguments& o)
 {
     ProfileStore store(o.profiles);
     const Person person = store.find(o.name);
-    if (!o.yes) {
-        throw base::error(
-            "{}: erasing cannot be undone: {} and all records; add --yes (palpate profile export keeps a copy)",
-            person.name, base::counted(static_cast<std::size_t>(person.sessions), "session"));
-    }
+    base::failIf(!o.yes,
+                 "{}: erasing cannot be undone: {} and all records; add --yes (palpate profile export keeps a copy)",
+                 person.name, base::counted(static_cast<std::size_t>(person.sessions), "session"));
     const training::Erased erased = store.erase(person);
     // The window has the people of the standard file.
     std::error_code none;

@@ -171,10 +171,8 @@ void checkOutputs(const TrainArguments& o)
     }
     const auto record = recordFile(o);
     base::checkOutputs({o.json, record}, {});
-    if (!record.empty() && fs::exists(record)) {
-        throw base::error("{}: exists already; choose another name or remove it{}", record.native(),
-                          (o.record.empty() ? " (the record beside the report)" : ""));
-    }
+    base::failIf(!record.empty() && fs::exists(record), "{}: exists already; choose another name or remove it{}",
+                 record.native(), o.record.empty() ? " (the record beside the report)" : "");
     base::failIf(!o.report.empty() && record == fs::path(o.report),
                  "{}: is the name of the record too: call the report .html", o.report);
 }
@@ -236,9 +234,8 @@ haptics::SessionModel openModel(TrainArguments& o)
         o.changes.memory = base::availableMemory();
     }
     haptics::SessionModel model = session::openSession(o.scene, o.changes);
-    if (const std::string why = o.anyway ? "" : session::whyTooSlow(session::rehearse(model), !o.unpaced); !why.empty()) {
-        throw base::error("{}: {}", o.scene, why);
-    }
+    const std::string why = o.anyway ? "" : session::whyTooSlow(session::rehearse(model), !o.unpaced);
+    base::failIf(!why.empty(), "{}: {}", o.scene, why);
     return model;
 }
 

@@ -16,9 +16,8 @@ namespace palpate::apps {
 
 std::string exportCt(const CtExport& o, const std::function<void(double)>& progress)
 {
-    if (const haptics::Record record(o.record); !(haptics::scanDoseOf(record.info()) > 0)) {
-        throw base::error("{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
-    }
+    base::failIf(!(haptics::scanDoseOf(haptics::Record(o.record).info()) > 0),
+                 "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
     const session::ShownState shown = session::shownState(o.record, o.at, std::nullopt, progress);
     const haptics::Showing& s = shown.showing;
     channel::Deformation body(s.scenery, s.labels);

@@ -160,13 +160,9 @@ std::vector<double> ticksOf(double low, double high, int most)
         return {low};
     }
     const double rough = (high - low) / most, power = std::pow(10.0, std::floor(std::log10(rough)));
-    double step = 10 * power;
-    for (const double times : {1.0, 2.0, 5.0}) {
-        if (times * power >= rough) {
-            step = times * power;
-            break;
-        }
-    }
+    constexpr std::array steps{1.0, 2.0, 5.0, 10.0};
+    const auto wide = [&](double times) { return times == steps.back() || times * power >= rough; };
+    const double step = power * *std::ranges::find_if(steps, wide);
     std::vector<double> ticks;
     for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n) {
         ticks.push_back(n * step);

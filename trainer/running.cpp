@@ -1,5 +1,6 @@
 #include <trainer/running.h>
 
+#include <base/descriptor.h>
 #include <base/error.h>
 #include <base/process.h>
 
@@ -19,13 +20,10 @@ namespace palpate::trainer {
 Running::Running(const std::filesystem::path& program, const std::vector<std::string>& arguments, std::filesystem::path log)
     : log_(std::move(log))
 {
-    const int out = ::open(log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    base::Program started{{program.string()}, {-1, out, out}, true};
+    const base::Descriptor out(::open(log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+    base::Program started{{program.string()}, {-1, *out, *out}, true};
     started.words.insert(started.words.end(), arguments.begin(), arguments.end());
     const auto [pid, error] = base::start(started);
-    if (out >= 0) {
-        ::close(out);
-    }
     base::failIf(error != 0, "{}: cannot be started ({})", program.native(), std::strerror(error));
     pid_ = pid;
 }

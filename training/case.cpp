@@ -163,9 +163,8 @@ Case findCase(const std::string& id)
             return loadCase(folder / id);
         }
     }
-    if (std::error_code none; fs::is_directory(id, none)) {
-        throw base::error("{}: no case: there is no {} in it", id, caseFile);
-    }
+    std::error_code none;
+    base::failIf(fs::is_directory(id, none), "{}: no case: there is no {} in it", id, caseFile);
     throw base::error("{}: there is no such case{} (palpate case list)", id,
                       base::meant(id, base::mapped<std::string>(allCases(), &Case::id)));
 }

@@ -42,9 +42,7 @@ std::string caseText(const NewCase& wanted, const datasets::Scene& scene, double
 
 Case makeCase(const NewCase& wanted)
 {
-    if (fs::exists(wanted.folder)) {
-        throw base::error("{}: exists already; choose another name or remove it", wanted.folder.native());
-    }
+    base::failIf(fs::exists(wanted.folder), "{}: exists already; choose another name or remove it", wanted.folder.native());
     base::failIf(wanted.volume.extension() != ".vdb", "{}: a case is made of a volume (.vdb): palpate import makes one",
                  wanted.volume.native());
     const volume::Tissue tissue = session::loadVolume(wanted.volume);

@@ -1,5 +1,6 @@
 #include <training/store.h>
 
+#include <base/descriptor.h>
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/nearest.h>
@@ -76,13 +77,11 @@ void makePrivate(const fs::path& file)
     if (!file.parent_path().empty() && base::makeFolders(file.parent_path())) {
         ::chmod(file.parent_path().c_str(), 0700);
     }
-    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    base::failIf(descriptor < 0, "{}: cannot be opened: {}", file.string(),
-                 errno == ELOOP ? "is a link" : std::strerror(errno));
-    if (isStore(descriptor)) {
-        ::fchmod(descriptor, 0600);
+    const base::Descriptor opened(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+    base::failIf(!opened, "{}: cannot be opened: {}", file.string(), errno == ELOOP ? "is a link" : std::strerror(errno));
+    if (isStore(*opened)) {
+        ::fchmod(*opened, 0600);
     }
-    ::close(descriptor);
 }
 
 std::int64_t pragma(const Database& database, const char* name)
@@ -122,9 +121,8 @@ void migrate(Database& database)
     Statement tables(database, "SELECT count(*) FROM sqlite_master");
     tables.step();
     base::failIf(tables.integer(0) > 0 && application != applicationId, "is no file of profiles: choose another name");
-    if (version > newest) {
-        throw base::error("was written by a newer Palpate (version {}; this one knows {}): update", version, newest);
-    }
+    base::failIf(version > newest, "was written by a newer Palpate (version {}; this one knows {}): update", version,
+                 newest);
     for (auto v = version; v < newest; ++v) {
         database.execute(migrations[static_cast<std::size_t>(v)]);
     }
@@ -370,9 +368,7 @@ Erased ProfileStore::erase(const Person& person)
 
 void ProfileStore::backup(const fs::path& to) const
 {
-    if (fs::exists(to)) {
-        throw base::error("{}: exists already; choose another name or remove it", to.native());
-    }
+    base::failIf(fs::exists(to), "{}: exists already; choose another name or remove it", to.native());
     const fs::path part = to.string() + fmt::format(".{}.part", ::getpid());
     try {
         makePrivate(part);
