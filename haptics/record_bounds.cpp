@@ -3,7 +3,6 @@
 #include <base/error.h>
 #include <haptics/record_format.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>

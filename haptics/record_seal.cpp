@@ -7,7 +7,6 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <bit>
 #include <map>
 #include <new>
 

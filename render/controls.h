@@ -10,7 +10,6 @@
 
 #include <vtkGenericRenderWindowInteractor.h>
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>

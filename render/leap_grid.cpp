@@ -6,7 +6,6 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
-#include <cstddef>
 
 namespace palpate::render {
 namespace {

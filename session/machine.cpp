@@ -16,7 +16,6 @@
 #include <exception>
 #include <fstream>
 #include <iterator>
-#include <memory>
 #include <optional>
 #include <thread>
 #include <vector>
