@@ -5,9 +5,7 @@
 #include <base/nearest.h>
 #include <command/interrupted.h>
 #include <command/options.h>
-#include <studies/accuracy/command.h>
-#include <studies/stability/command.h>
-#include <studies/validate/command.h>
+#include <studies/commands.h>
 #ifdef PALPATE_SWEEP
 #include <sweep/command.h>
 #endif

@@ -1,4 +1,4 @@
-#include <studies/accuracy/command.h>
+#include <studies/commands.h>
 
 #include <base/build.h>
 #include <base/error.h>

@@ -1,4 +1,4 @@
-#include <studies/needle/command.h>
+#include <studies/commands.h>
 
 #include <base/outputs.h>
 #include <command/json.h>

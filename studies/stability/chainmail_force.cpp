@@ -81,20 +81,15 @@ struct ChainMailForce {
 
 }  // namespace
 
+// Source: Gibson, "3D ChainMail", I3D 1997: shapes that build on each other, no elastic relaxation.
 StabilityMethod chainMailForce()
 {
-    const char* const source = "Gibson, \"3D ChainMail\", I3D 1997: shapes that build on each other, no elastic relaxation";
-    return {"chainmail_force",
-            source,
-            datasets::ModelLevel::chainmail,
-            false,
-            false,
-            [](const MethodScene& scene) -> RunningMethod {
-                auto state = std::make_shared<ChainMailForce>(scene);
-                return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); },
-                        [state] { return state->furthest(); },
-                        {}};
-            }};
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        auto state = std::make_shared<ChainMailForce>(scene);
+        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); },
+                [state] { return state->furthest(); }};
+    };
+    return {"chainmail_force", start, datasets::ModelLevel::chainmail};
 }
 
 }  // namespace palpate::studies

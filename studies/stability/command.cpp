@@ -1,4 +1,4 @@
-#include <studies/stability/command.h>
+#include <studies/commands.h>
 
 #include <base/error.h>
 #include <base/outputs.h>

@@ -1,6 +1,5 @@
 #include <studies/stability/figures.h>
 
-#include <studies/stability/limits.h>
 #include <studies/stability/theory.h>
 
 #include <fmt/format.h>

@@ -84,17 +84,14 @@ struct GodObject {
 
 }  // namespace
 
+// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995; on the faces of voxels.
 StabilityMethod godObject()
 {
-    const char* const source =
-        "Zilles and Salisbury, \"A constraint-based god-object method for haptic display\", IROS 1995; on the faces of "
-        "voxels";
-    return {
-        "god_object", source, datasets::ModelLevel::spring, false, false, [](const MethodScene& scene) -> RunningMethod {
-            auto god = std::make_shared<GodObject>(
-                GodObject{scene, ContactVoxels(scene.model), volume::Tissue::Reader(*scene.model.tissue)});
-            return {[god](const haptics::DeviceSample& sample) { return god->tick(sample); }, [] { return 0.0; }, {}};
-        }};
+    return {"god_object", [](const MethodScene& scene) -> RunningMethod {
+                auto god = std::make_shared<GodObject>(
+                    GodObject{scene, ContactVoxels(scene.model), volume::Tissue::Reader(*scene.model.tissue)});
+                return {[god](const haptics::DeviceSample& sample) { return god->tick(sample); }};
+            }};
 }
 
 }  // namespace palpate::studies

@@ -62,20 +62,16 @@ struct Layers {
 
 }  // namespace
 
+// The layer-based model of the thesis that Palpate started from.
 StabilityMethod layers()
 {
-    return {
-        "layers",
-        "the layer-based model of the thesis that Palpate started from",
-        datasets::ModelLevel::spring,
-        false,
-        true,
-        [](const MethodScene& scene) -> RunningMethod {
-            const auto& tool = scene.model.scene.tool;
-            const double front = tool.kind == datasets::ToolKind::needle ? 0.0 : tool.radius;
-            auto state = std::make_shared<Layers>(Layers{scene, volume::Tissue::Reader(*scene.model.tissue), front});
-            return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); }, [] { return 0.0; }, {}};
-        }};
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        const auto& tool = scene.model.scene.tool;
+        const double front = tool.kind == datasets::ToolKind::needle ? 0.0 : tool.radius;
+        auto state = std::make_shared<Layers>(Layers{scene, volume::Tissue::Reader(*scene.model.tissue), front});
+        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); }};
+    };
+    return {"layers", start, datasets::ModelLevel::spring, true};
 }
 
 }  // namespace palpate::studies

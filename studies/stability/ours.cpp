@@ -70,25 +70,20 @@ std::vector<StabilityMethod> ourMethods()
     using datasets::ModelLevel;
     std::vector<StabilityMethod> out;
     for (const ModelLevel level : {ModelLevel::elastic, ModelLevel::chainmail, ModelLevel::spring}) {
-        out.push_back(
-            {std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), "Palpate", level, true, true, running});
+        out.push_back({std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), running, level, true});
     }
     return out;
 }
 
+// Palpate's force, updated by a tissue model at 60 Hz.
 StabilityMethod lateUpdates()
 {
-    return {"late_60hz",
-            "Palpate's force, updated by a tissue model at 60 Hz",
-            datasets::ModelLevel::elastic,
-            false,
-            true,
-            [](const MethodScene& scene) -> RunningMethod {
-                auto held = std::make_shared<Held>(Held{simulationOf(scene), scene.period, 1.0 / 60.0});
-                return {[held](const haptics::DeviceSample& sample) { return held->tick(sample); },
-                        [held] { return furthestNode(*held->simulation); },
-                        {}};
-            }};
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        auto held = std::make_shared<Held>(Held{simulationOf(scene), scene.period, 1.0 / 60.0});
+        return {[held](const haptics::DeviceSample& sample) { return held->tick(sample); },
+                [held] { return furthestNode(*held->simulation); }};
+    };
+    return {"late_60hz", start, datasets::ModelLevel::elastic, true};
 }
 
 }  // namespace palpate::studies

@@ -40,28 +40,20 @@ Vec3 depthVector(const ContactVoxels& voxels, Vec3 p) noexcept
 
 }  // namespace
 
+// Source: Massie and Salisbury, "The PHANToM haptic interface: a device for probing virtual objects", ASME 1994.
 StabilityMethod superposedNormals()
 {
-    const char* const source =
-        "Massie and Salisbury, \"The PHANToM haptic interface: a device for probing virtual objects\", ASME 1994";
-    return {"superposed_normals",
-            source,
-            datasets::ModelLevel::spring,
-            false,
-            false,
-            [](const MethodScene& scene) -> RunningMethod {
+    return {"superposed_normals", [](const MethodScene& scene) -> RunningMethod {
                 auto voxels = std::make_shared<const ContactVoxels>(scene.model);
                 auto reader = std::make_shared<const volume::Tissue::Reader>(*scene.model.tissue);
                 return {[=](const haptics::DeviceSample& sample) {
-                            if (!voxels->solid(voxels->voxel(sample.position))) {
-                                return Vec3(0.0);
-                            }
-                            const Vec3 depth = depthVector(*voxels, sample.position);
-                            const double k = contactStiffness(scene, *reader, sample.position, sample.axis);
-                            return haptics::bounded(k * depth, capOf(scene));
-                        },
-                        [] { return 0.0; },
-                        {}};
+                    if (!voxels->solid(voxels->voxel(sample.position))) {
+                        return Vec3(0.0);
+                    }
+                    const Vec3 depth = depthVector(*voxels, sample.position);
+                    const double k = contactStiffness(scene, *reader, sample.position, sample.axis);
+                    return haptics::bounded(k * depth, capOf(scene));
+                }};
             }};
 }
 

@@ -1,4 +1,4 @@
-#include <studies/thesis/command.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/error.h>

@@ -1,4 +1,4 @@
-#include <studies/transfer/command.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/error.h>
