@@ -7,7 +7,6 @@
 #include <session/figures.h>
 #include <session/open.h>
 #include <studies/commands.h>
-#include <studies/tick/bench_query.h>
 #include <studies/tick/bench_tick.h>
 
 #include <fmt/format.h>

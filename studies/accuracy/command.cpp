@@ -15,7 +15,6 @@
 #include <studies/accuracy/log.h>
 #include <studies/accuracy/references.h>
 #include <studies/accuracy/rival.h>
-#include <studies/accuracy/verify.h>
 #include <studies/kernel/trial_errors.h>
 
 #include <fmt/format.h>

@@ -2,7 +2,7 @@
 
 #include <base/mapped.h>
 #include <chainmail/elastic.h>
-#include <studies/accuracy/contact_formulas.h>
+#include <studies/accuracy/elastic_formulas.h>
 #include <studies/accuracy/deep_press.h>
 
 #include <fmt/format.h>

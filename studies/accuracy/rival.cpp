@@ -4,7 +4,6 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/split.h>
-#include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
 #include <studies/kernel/trial_errors.h>
 

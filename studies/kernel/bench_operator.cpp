@@ -1,5 +1,6 @@
 #include <studies/kernel/bench_operator.h>
 
+#include <chainmail/kernels_sets.h>
 #include <chainmail/window.h>
 
 #include <algorithm>
@@ -8,6 +9,16 @@
 #include <stdexcept>
 
 namespace palpate::studies {
+
+KernelSets kernelSets()
+{
+    using namespace chainmail;
+    KernelSets sets{{kernelsV2.name, kernelsAvx2.name, kernelsAvx512.name}, {}};
+    for (const Kernels* set : supportedKernels()) {
+        sets.runs.emplace_back(set->name);
+    }
+    return sets;
+}
 
 using namespace chainmail;
 

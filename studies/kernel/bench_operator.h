@@ -7,6 +7,14 @@
 
 namespace palpate::studies {
 
+/// Instruction sets that level `elastic` is compiled for, narrowest first. Forces have the same bits in all.
+struct KernelSets {
+    std::vector<std::string> built;
+    std::vector<std::string> runs;  // those that this machine has
+};
+
+KernelSets kernelSets();
+
 /// What the operator has to do for one cell, counted from the formulas of chainmail/kernels.h as they are factored there.
 struct OperatorCost {
     double additions = 0;

@@ -1,4 +1,4 @@
-#include <studies/validate/palpation.h>
+#include <studies/validate/experiment.h>
 
 #include <base/error.h>
 #include <haptics/session_model.h>

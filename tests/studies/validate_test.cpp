@@ -1,10 +1,6 @@
-#include <studies/validate/beam.h>
 #include <studies/validate/cell_body.h>
 #include <studies/validate/measurements.h>
-#include <studies/validate/needle.h>
-#include <studies/validate/palpation.h>
-#include <studies/validate/silicone.h>
-#include <studies/validate/yeoh.h>
+#include <studies/validate/experiment.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>
