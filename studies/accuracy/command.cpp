@@ -12,10 +12,9 @@
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
 #include <studies/accuracy/installed_rivals.h>
-#include <studies/accuracy/log.h>
 #include <studies/accuracy/references.h>
 #include <studies/accuracy/rival.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

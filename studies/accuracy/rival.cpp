@@ -5,7 +5,7 @@
 #include <base/mapped.h>
 #include <base/split.h>
 #include <studies/accuracy/rival_files.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <fmt/format.h>
 

@@ -11,7 +11,7 @@
 #include <datasets/phantom_random.h>
 #include <studies/thesis/figures.h>
 #include <studies/thesis/tasks_scene.h>
-#include <studies/transfer/timeline.h>
+#include <studies/transfer/transfer.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -11,7 +11,6 @@
 #include <session/figures.h>
 #include <session/open.h>
 #include <session/trainer.h>
-#include <studies/transfer/timeline.h>
 #include <studies/transfer/transfer.h>
 
 #include <fmt/format.h>

@@ -1,7 +1,7 @@
 #include <studies/accuracy/accuracy.h>
 #include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>

@@ -1,6 +1,6 @@
 #include <chainmail/kernels.h>
 #include <studies/kernel/bench_operator.h>
-#include <studies/kernel/machine_rates_sets.h>
+#include <studies/kernel/machine_rates.h>
 
 #include <gtest/gtest.h>
 

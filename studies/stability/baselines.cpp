@@ -1,3 +1,4 @@
+#include <chainmail/propagate.h>
 #include <haptics/bounded.h>
 #include <studies/stability/method.h>
 
@@ -164,6 +165,158 @@ StabilityMethod superposedNormals()
                     return haptics::bounded(k * depth, capOf(scene));
                 }};
             }};
+}
+
+namespace {
+
+// One layer at a time is there to be touched. When it gives way it is removed for good, and its flag keeps a force along
+// the needle until the next layer is touched: also in a gap, and also in the air outside.
+struct Layers {
+    MethodScene scene;
+    volume::Tissue::Reader reader;
+    double front = 0;  // of the tool's foremost point ahead of its position [m]
+    std::array<bool, haptics::maxTissues> removed{};
+    std::uint8_t touched = 0;  // layer in contact; 0 = none
+    std::uint8_t flagged = 0;  // removed layer whose force goes on; 0 = none
+
+    const volume::TissueRow& row(std::uint8_t r) const noexcept { return scene.model.tissue->table().rows[r]; }
+
+    // From the surface of what is not removed to the tip, along the tool: the surface contact point stays there [m].
+    double depthBelow(Vec3 tip, Vec3 axis) const noexcept
+    {
+        constexpr double step = 0.1e-3, furthest = 50e-3;
+        double depth = 0.0;
+        while (depth < furthest) {
+            const auto here = reader.tissue(tip - depth * axis);
+            if (here == 0 || removed[here]) {
+                break;
+            }
+            depth += step;
+        }
+        return depth;
+    }
+
+    Vec3 tick(const haptics::DeviceSample& sample) noexcept
+    {
+        const Vec3 tip = sample.position + front * sample.axis;
+        const auto here = reader.tissue(tip);
+        if (touched == 0 && here != 0 && !removed[here]) {
+            touched = here;
+            flagged = 0;
+        }
+        if (touched == 0) {
+            return haptics::bounded(-row(flagged).cuttingForce * sample.axis, capOf(scene));
+        }
+        const double depth = depthBelow(tip, sample.axis);
+        if (depth <= 0.0) {
+            touched = 0;
+            return Vec3(0.0);
+        }
+        const double force = contactStiffness(scene, reader, tip - depth * sample.axis, sample.axis) * depth;
+        if (force > row(touched).punctureForce) {
+            removed[touched] = true;
+            flagged = touched;
+            touched = 0;
+        }
+        return haptics::bounded(-force * sample.axis, capOf(scene));
+    }
+};
+
+}  // namespace
+
+// The layer-based model of the thesis that Palpate started from.
+StabilityMethod layers()
+{
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        const auto& tool = scene.model.scene.tool;
+        const double front = tool.kind == datasets::ToolKind::needle ? 0.0 : tool.radius;
+        auto state = std::make_shared<Layers>(Layers{scene, volume::Tissue::Reader(*scene.model.tissue), front});
+        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); }};
+    };
+    return {"layers", start, datasets::ModelLevel::spring, true};
+}
+
+namespace {
+
+using chainmail::Node;
+
+// ChainMail goes on from the shape of the tick before, and nothing relaxes it. The nodes in the tool are put onto its
+// surface; their links, stretched as springs, make the force.
+struct ChainMailForce {
+    static constexpr std::uint32_t maxMoves = 5000;
+    static constexpr std::size_t maxSeeds = 4096;
+
+    explicit ChainMailForce(const MethodScene& at)
+        : scene(at), lattice(at.model.lattice), u(lattice.grid.count(), Vec3f(0.0F)), scratch(lattice, maxMoves, maxSeeds)
+    {
+        seeds.reserve(maxSeeds);
+    }
+
+    Vec3 tick(const haptics::DeviceSample& sample) noexcept
+    {
+        hold(sample);
+        scratch.clear();
+        chainmail::propagate(lattice, u, scratch, seeds);
+        Vec3 force(0.0);
+        for (const auto& seed : seeds) {
+            const double k = scene.model.youngsModulus.at(rest(seed.node)) * lattice.grid.spacing;
+            for (int side = 0; side < 6; ++side) {
+                const Node other = lattice.beside(seed.node, side);
+                if (lattice.isNode(other)) {
+                    force += k * Vec3(u[other] - u[seed.node]);
+                }
+            }
+        }
+        return haptics::bounded(force, capOf(scene));
+    }
+
+    Vec3 rest(Node n) const noexcept { return lattice.grid.position(lattice.grid.node(n)); }
+
+    // The tool is widened to one spacing where the lattice could not see it.
+    void hold(const haptics::DeviceSample& sample) noexcept
+    {
+        seeds.clear();
+        const double radius = std::max(scene.model.scene.tool.radius, lattice.grid.spacing);
+        for (Node n = 0; n < u.size() && seeds.size() < maxSeeds; ++n) {
+            if (!lattice.isNode(n) || lattice.isFixed(n)) {
+                continue;
+            }
+            const Vec3 away = rest(n) + Vec3(u[n]) - sample.position;
+            const double distance = glm::length(away);
+            if (distance < radius && distance > 0.0) {
+                const Vec3 onto = sample.position + radius / distance * away;
+                seeds.push_back({n, Vec3f(onto - rest(n))});
+            }
+        }
+    }
+
+    double furthest() const noexcept
+    {
+        double most = 0.0;
+        for (const Vec3f& d : u) {
+            most = std::max(most, static_cast<double>(glm::length(d)));
+        }
+        return most;
+    }
+
+    MethodScene scene;
+    const chainmail::Lattice& lattice;
+    std::vector<Vec3f> u;  // displacement of each node [m]
+    chainmail::PropagateScratch scratch;
+    std::vector<chainmail::Seed> seeds;
+};
+
+}  // namespace
+
+// Source: Gibson, "3D ChainMail", I3D 1997: shapes that build on each other, no elastic relaxation.
+StabilityMethod chainMailForce()
+{
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        auto state = std::make_shared<ChainMailForce>(scene);
+        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); },
+                [state] { return state->furthest(); }};
+    };
+    return {"chainmail_force", start, datasets::ModelLevel::chainmail};
 }
 
 }  // namespace palpate::studies
