@@ -1,9 +1,8 @@
-#include <studies/commands.h>
-
 #include <base/build.h>
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -11,14 +10,14 @@
 #include <studies/accuracy/conforming.h>
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
-#include <studies/accuracy/installed_rivals.h>
 #include <studies/accuracy/references.h>
 #include <studies/accuracy/rival.h>
+#include <studies/commands.h>
 #include <studies/kernel/kernel_trial.h>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <iterator>
@@ -48,6 +47,30 @@ struct AccuracyArguments {
     std::vector<std::string> settings = DeepCommand{}.settings;  // of --depth
     double speed = DeepCommand{}.speed;                          // the same [mm/s]
 };
+
+struct Known {
+    const char* name;
+    const char* program;  // of ours
+    const char* needs;    // another one; "" = none
+    const char* setting;
+    std::vector<double> spacings;  // [m]
+};
+
+const Known known[]{{"bullet", "palpate-rival-bullet", "", "explicit, Poisson 0.45", {6e-3, 4e-3}},
+                    {"calculix", "palpate-rival-calculix", "ccx", "quadratic", {12e-3, 8e-3}}};
+
+// Solvers of others for which we have a program, and which are installed here: Bullet's deformable bodies and CalculiX.
+std::vector<Rival> installedRivals()
+{
+    std::vector<Rival> rivals;
+    for (const Known& k : known) {
+        const std::filesystem::path program = ourProgram(k.program);
+        if (!program.empty() && (*k.needs == '\0' || !ourProgram(k.needs).empty())) {
+            rivals.push_back({k.name, base::shellWord(program.string()), k.setting, k.spacings});
+        }
+    }
+    return rivals;
+}
 
 // A subject with its references, one per law.
 struct Solved {
