@@ -11,7 +11,7 @@
 #include <reference/symmetry.h>
 #include <reference/tetgen_mesh.h>
 #include <reference/verification.h>
-#include <reference/vtu.h>
+#include <reference/mesh_files.h>
 #include <session/open.h>
 #include <studies/accuracy/reference_file.h>
 

@@ -3,7 +3,7 @@
 #include <base/build.h>
 #include <sweep/case.h>
 #include <sweep/folder.h>
-#include <sweep/local.h>
+#include <sweep/pool.h>
 #include <sweep/procedure.h>
 #include <sweep/run.h>
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <reference/factor.h>
-#include <reference/obstacle.h>
+#include <reference/tissue_terms.h>
 #include <reference/solve.h>
 
 #include <memory>

@@ -8,7 +8,7 @@
 #include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
-#include <sweep/local.h>
+#include <sweep/pool.h>
 #include <sweep/report.h>
 #include <sweep/run.h>
 #include <sweep/slurm.h>

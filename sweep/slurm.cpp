@@ -4,7 +4,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
-#include <sweep/local.h>
+#include <sweep/pool.h>
 #include <sweep/lock.h>
 
 #include <fmt/format.h>
