@@ -6,12 +6,12 @@
 #include <base/outputs.h>
 #include <command/json.h>
 #include <reference/ccx.h>
+#include <reference/mesh_files.h>
 #include <reference/press_path.h>
 #include <reference/refill.h>
 #include <reference/symmetry.h>
 #include <reference/tetgen_mesh.h>
 #include <reference/verification.h>
-#include <reference/mesh_files.h>
 #include <session/open.h>
 #include <studies/accuracy/reference_file.h>
 

@@ -15,9 +15,9 @@
 #include <studies/commands.h>
 #include <studies/kernel/kernel_trial.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <iterator>

@@ -70,10 +70,8 @@ std::map<double, std::vector<double>> errorsOf(const json& figures, const std::s
 
 report::Chart chartOf(const json& figures, const std::string& what, const Panel& panel)
 {
-    report::Chart chart;
-    chart.title = fmt::format("{}: error of the force, {}", what, panel.title);
-    chart.xLabel = "depth [radii of the tool]";
-    chart.yLabel = "error of the force [%]";
+    report::Chart chart{fmt::format("{}: error of the force, {}", what, panel.title), "depth [radii of the tool]",
+                        "error of the force [%]"};
     chart.logX = panel.logX;
     chart.logY = true;
     for (const auto& setting : differentValues(figures.at("summary"), [](const json& e) { return e.at("setting"); })) {

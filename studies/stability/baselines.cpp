@@ -87,7 +87,8 @@ struct GodObject {
 
 }  // namespace
 
-// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995; on the faces of voxels.
+// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995; on the faces of
+// voxels.
 StabilityMethod godObject()
 {
     return {"god_object", [](const MethodScene& scene) -> RunningMethod {

@@ -9,9 +9,9 @@
 #include <studies/commands.h>
 #include <studies/stability/figures.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <memory>

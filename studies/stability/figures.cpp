@@ -184,15 +184,9 @@ std::optional<double> numberIn(const std::string& scene, const StabilityView& vi
 // The premium device under a hand that holds on, at 1 kHz.
 std::optional<report::Chart> chartOfView(const json& figures, const StabilityView& view)
 {
-    report::Chart chart;
-    chart.title = view.title;
-    chart.xLabel = view.xLabel;
-    chart.yLabel = view.yLabel;
-    chart.logY = true;
+    report::Chart chart{view.title, view.xLabel, view.yLabel, false, true};
     for (const auto& method : namesOf(figures, "method")) {
-        report::ChartSeries series;
-        series.name = method;
-        series.line = true;
+        report::ChartSeries series{method, {}, {}, true};
         for (const json& cell : figures.at("cells")) {
             const auto x = numberIn(cell.at("scene"), view);
             if (x && cell.at("method") == method && cell.at("device") == "premium" && cell.at("grip") == "grip" &&
@@ -284,11 +278,8 @@ std::vector<report::Chart> limitCharts(const json& figures)
     for (const json& point : figures.at("limits")) {
         const std::string label = point.at("label");
         if (charts.empty() || charts.back().xLabel != label) {
-            report::Chart chart;
-            chart.title = "Largest stable stiffness against " + point.at("map").get<std::string>();
-            chart.xLabel = label;
-            chart.yLabel = "stiffness [N/m]";
-            chart.logY = true;
+            report::Chart chart{"Largest stable stiffness against " + point.at("map").get<std::string>(), label,
+                                "stiffness [N/m]", false, true};
             chart.logX = point.at("map") == "rate";
             chart.series = {{"formula, (b + b_hand) / (T / 2 + delay)", {}, {}, true, false},
                             {"simulated", {}, {}, false, true}};

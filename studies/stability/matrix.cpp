@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <atomic>

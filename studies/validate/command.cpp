@@ -6,9 +6,9 @@
 #include <command/progress.h>
 #include <datasets/tables.h>
 #include <haptics/scenery.h>
+#include <studies/validate/experiment.h>
 #include <studies/validate/figures.h>
 #include <studies/validate/measurements.h>
-#include <studies/validate/experiment.h>
 #include <ultrasound/checks.h>
 
 #include <fmt/format.h>

@@ -193,9 +193,6 @@ struct Lump {
 /// Force of the tissue on the fingertip [N]. Throws as a scene does.
 double forceOver(const Lump& lump);
 
-/// Spearman's rank correlation; ties share their mean rank. NaN for fewer than two values.
-double rankCorrelation(const std::vector<double>& a, const std::vector<double>& b);
-
 /// Order in which 80 physicians detected lumps (by size and hardness) beside the order of the contrast of force.
 /// @param file  literature_facts_read.csv, see datasets/measured/README.md
 /// Throws as Measurements does.
