@@ -310,7 +310,7 @@ void run(const ReferenceArguments& o)
     auto& info = results.info;
     const double poissonCap = model.scene.model.elastic.poissonCap;
     info.press = studies::pressOf(path);
-    info.body = studies::bodyKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
+    info.body = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap, false);
     info.key = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
     info.scene = model.scene.name;
     info.tool = tool.name;
