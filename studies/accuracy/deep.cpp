@@ -149,8 +149,6 @@ std::vector<std::filesystem::path> writeDeepFolder(const std::filesystem::path& 
     return pictures;
 }
 
-using nlohmann::json;
-
 namespace {
 
 constexpr std::array<std::pair<const char*, const char*>, 5> zones{

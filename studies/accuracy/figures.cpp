@@ -247,8 +247,6 @@ std::string accuracyCsv(const json& figures)
     return out;
 }
 
-using nlohmann::json;
-
 AccuracyLog::AccuracyLog(std::filesystem::path file, std::string build) : file_(std::move(file)), build_(std::move(build))
 {
     if (file_.empty() || !std::filesystem::exists(file_)) {

@@ -151,8 +151,6 @@ std::string stabilityCsv(const json& figures)
     return out;
 }
 
-using nlohmann::json;
-
 namespace {
 
 // A figure against a number in the scenes' names: "slide-30deg-20mm_s" with prefix "slide-" and ending "deg-20mm_s" is 30.

@@ -114,9 +114,6 @@ std::string offers(const volume::ImportedLabels& labels, const LabelCounts& coun
                         : fmt::format("; its values would fit {}{}: is it one of these?", fmt::join(list, ", or "), more);
 }
 
-using datasets::LabelMap;
-using volume::LabelName;
-
 constexpr std::size_t maxListed = 40;  // labels in a message
 constexpr std::size_t maxContradictions = 8;
 

@@ -71,8 +71,6 @@ std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratc
     return moves;
 }
 
-using namespace chainmail;
-
 namespace {
 
 // Spacing [m], and the fraction of the table's limits that erred least over presses and drags of a 10 mm sphere in the
