@@ -189,7 +189,7 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
     const json own = ownOf(plan_.text, textOf(folder_ / "scene.toml"));
     for (const auto& [name, hash] : own.items()) {
         // A folder of an older build has no hash.
-        if (about.contains("own") && about["own"].value(name, std::string()) != hash) {
+        if (about.contains("own") && hash != about["own"].value(name, std::string())) {
             throw base::error(
                 "{}: was changed since the sweep began, and the cases that are done are of the old one: bring it "
                 "back, or begin in another folder",

@@ -1,6 +1,7 @@
 #include <volume/scalar_field.h>
 
 #include <volume/label_image.h>
+#include <volume/voxel_distance.h>
 
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>

@@ -20,6 +20,12 @@ namespace {
 using datasets::LabelMap;
 using volume::LabelName;
 
+const LabelName* find(const std::vector<LabelName>& names, std::uint16_t value)
+{
+    const auto found = std::find_if(names.begin(), names.end(), [&](const LabelName& n) { return n.value == value; });
+    return found == names.end() ? nullptr : &*found;
+}
+
 constexpr std::size_t maxLabels = 4;  // shown of each offer
 constexpr std::size_t maxOffers = 6;
 
@@ -46,12 +52,6 @@ bool sameTissues(const LabelMap& a, const LabelMap& b, const LabelCounts& counts
         const LabelName* second = find(b.labels, label.first);
         return label.first == 0 || (first != nullptr && second != nullptr && first->tissue == second->tissue);
     });
-}
-
-const LabelName* find(const std::vector<LabelName>& names, std::uint16_t value)
-{
-    const auto found = std::find_if(names.begin(), names.end(), [&](const LabelName& n) { return n.value == value; });
-    return found == names.end() ? nullptr : &*found;
 }
 
 // The built-in map whose names and values are those of all labels, or null. Names alone tell: 3, 11 and 20 are a kidney, a

@@ -140,7 +140,7 @@ private:
     std::optional<std::pair<Index3, Index3>> boxFromText() const
     {
         const auto numbers = base::mapped<std::optional<double>>(base::splitAt(',', options_.crop), base::numberIn<>);
-        if (numbers.size() != 6 || std::ranges::find(numbers, std::nullopt) != numbers.end()) {
+        if (numbers.size() != 6 || !std::ranges::all_of(numbers, [](const auto& number) { return number.has_value(); })) {
             return std::nullopt;
         }
         const auto mm = base::mapped<double>(numbers, [](const auto& number) { return *number; });
