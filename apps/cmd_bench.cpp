@@ -6,15 +6,8 @@
 #include <planner/costs.h>
 #include <session/figures.h>
 #include <session/open.h>
-#include <studies/kernel/command.h>
-#include <studies/needle/command.h>
-#include <studies/thesis/command.h>
-#include <studies/thesis/scale.h>
-#include <studies/tick/bench_query.h>
+#include <studies/commands.h>
 #include <studies/tick/bench_tick.h>
-#include <studies/tick/load.h>
-#include <studies/tick/view.h>
-#include <studies/transfer/command.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

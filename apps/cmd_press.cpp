@@ -6,7 +6,6 @@
 #include <base/outputs.h>
 #include <command/progress.h>
 #include <session/open.h>
-#include <studies/press/pose_load.h>
 #include <studies/press/press.h>
 
 #include <fmt/format.h>

@@ -6,9 +6,7 @@
 #include <base/mapped.h>
 #include <base/nearest.h>
 #include <command/options.h>
-#include <studies/accuracy/command.h>
-#include <studies/stability/command.h>
-#include <studies/validate/command.h>
+#include <studies/commands.h>
 #ifdef PALPATE_SWEEP
 #include <sweep/command.h>
 #endif

@@ -6,12 +6,12 @@
 #include <base/outputs.h>
 #include <command/json.h>
 #include <reference/ccx.h>
+#include <reference/mesh_files.h>
 #include <reference/press_path.h>
 #include <reference/refill.h>
 #include <reference/symmetry.h>
 #include <reference/tetgen_mesh.h>
 #include <reference/verification.h>
-#include <reference/vtu.h>
 #include <session/open.h>
 #include <studies/accuracy/reference_file.h>
 
@@ -309,7 +309,7 @@ void run(const ReferenceArguments& o)
     auto& info = results.info;
     const double poissonCap = model.scene.model.elastic.poissonCap;
     info.press = studies::pressOf(path);
-    info.body = studies::bodyKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
+    info.body = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap, false);
     info.key = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
     info.scene = model.scene.name;
     info.tool = tool.name;

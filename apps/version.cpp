@@ -1,7 +1,7 @@
 #include <apps/version.h>
 
 #include <base/build.h>
-#include <studies/kernel/sets.h>
+#include <studies/kernel/bench_operator.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

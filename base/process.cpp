@@ -1,7 +1,10 @@
 #include <base/process.h>
 
 #include <fcntl.h>
+#include <signal.h>
 #include <spawn.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -91,6 +94,17 @@ int run(const Program& program)
         throw std::runtime_error(program.words[0] + ": cannot be started (" + std::strerror(error) + ")");
     }
     return exitStatus(pid);
+}
+
+void becomeQuietChild() noexcept
+{
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const rlimit none{0, 0};
+    ::setrlimit(RLIMIT_CORE, &none);
+    if (const int nowhere = ::open("/dev/null", O_WRONLY); nowhere >= 0) {
+        ::dup2(nowhere, STDOUT_FILENO);
+        ::dup2(nowhere, STDERR_FILENO);
+    }
 }
 
 }  // namespace palpate::base

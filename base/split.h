@@ -46,10 +46,11 @@ inline std::string_view withoutPlus(std::string_view text)
 }
 
 /// The number that a cell holds, which may be infinite or NaN; nothing where it holds anything else.
-inline std::optional<double> numberIn(std::string_view cell)
+template <typename Number = double>
+std::optional<Number> numberIn(std::string_view cell)
 {
     cell = withoutPlus(cell);
-    double value = 0.0;
+    Number value = 0;
     const auto [rest, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
     return error == std::errc() && rest == cell.data() + cell.size() ? std::optional(value) : std::nullopt;
 }

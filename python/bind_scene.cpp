@@ -21,7 +21,13 @@ namespace {
 
 std::string textOfPath(const py::object& what)
 {
-    return py::str(py::module_::import("os").attr("fspath")(what)).cast<std::string>();
+    const py::str text(py::module_::import("os").attr("fspath")(what));
+    Py_ssize_t size = 0;
+    const char* const utf8 = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
+    if (utf8 == nullptr) {
+        throw py::error_already_set();  // half a character is a ValueError
+    }
+    return {utf8, static_cast<std::size_t>(size)};
 }
 
 SceneBox parsed(const std::string& text, const std::string& origin)

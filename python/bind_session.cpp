@@ -1,4 +1,4 @@
-#include <python/live_ultrasound.h>
+#include <python/live_session.h>
 #include <python/scene_box.h>
 #include <python/tick_rows.h>
 

@@ -3,7 +3,7 @@
 #include <base/build.h>
 #include <sweep/case.h>
 #include <sweep/folder.h>
-#include <sweep/local.h>
+#include <sweep/pool.h>
 #include <sweep/procedure.h>
 #include <sweep/run.h>
 
@@ -26,7 +26,7 @@ std::size_t runSweep(const std::filesystem::path& folder, const std::string& pla
     const auto alone = sweep::oneThread();
     SweepFolder held(folder, plan, true);
     held.clean();
-    const sweep::CasesWanted wanted{sweep::allCases(held.plan()), retry, false};
+    const sweep::CasesWanted wanted{sweep::casesOfShard("1/1", held.plan().cases()), retry, false};
     const auto cases = sweep::remainingCases(held, wanted, [](const std::string&) {});
     const std::size_t all = held.plan().cases(), before = all - cases.size();
     // An interrupt may come while Python reports: the cases in flight are finished and the tables written in any case.

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <reference/factor.h>
-#include <reference/obstacle.h>
 #include <reference/solve.h>
+#include <reference/tissue_terms.h>
 
 #include <memory>
 #include <span>

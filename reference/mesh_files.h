@@ -1,5 +1,6 @@
 #pragma once
 
+#include <reference/solve.h>
 #include <reference/tet_mesh.h>
 #include <volume/tissue_table.h>
 
@@ -22,5 +23,9 @@ void checkMeshFile(const std::filesystem::path& file);
 ///
 /// Throws std::runtime_error as checkMeshFile().
 std::string meshText(const TetMesh& mesh, const volume::TissueTable& table, const std::filesystem::path& file);
+
+/// A solved state as a VTK unstructured grid (.vtu, XML) for ParaView: quadratic tetrahedra at rest, with `displacement`
+/// [m] at their points, and `stress` (Cauchy, mean, [Pa]) and `tissue` (see BodyMesh) of each.
+std::string vtuText(const TetMesh& mesh, const Solver& solver);
 
 }  // namespace palpate::reference

@@ -1,9 +1,10 @@
 #include <reference/tissue_terms.h>
 
-#include <getfem/getfem_generic_assembly.h>
-
 #include <fmt/format.h>
+#include <getfem/getfem_generic_assembly.h>
+#include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -61,6 +62,18 @@ std::string testedStress(const SolveOptions& options, bool stiffens)
     const std::string rise = stiffens ? fmt::format("(1+law{}slope(I,b))*", options.law.index()) : "";
     const std::string shape = linear ? "2*mu*Deviator(Sym(Grad_u))" : "mu*" + rise + "pow(Det(F),-5/3)*Deviator(F*F')";
     return "(" + shape + "+" + pressure + "*Id(3)):Test_s";
+}
+
+Vec3 Obstacle::fractions() const noexcept
+{
+    const double square = glm::dot(shaft, shaft);
+    return square > 0.0 ? shaft / square : Vec3(0.0);
+}
+
+double Obstacle::distance(Vec3 p) const noexcept
+{
+    const double fraction = std::clamp(glm::dot(p - centre, fractions()), 0.0, 1.0);
+    return glm::distance(p, centre + fraction * shaft) - radius;
 }
 
 }  // namespace palpate::reference

@@ -2,7 +2,6 @@
 
 #include <reference/box_mesh.h>
 #include <reference/solve.h>
-#include <studies/accuracy/contact_formulas.h>
 #include <studies/accuracy/elastic_formulas.h>
 
 #include <fmt/format.h>

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -58,8 +57,7 @@ void insertValue(toml::table& table, std::string_view key, const KeyValue& value
 toml::table& elementOf(toml::array& list, std::string_view part, const std::string& key)
 {
     std::vector<std::string> names;
-    std::size_t number = list.size();
-    std::from_chars(part.data(), part.data() + part.size(), number);
+    const auto number = base::numberIn<std::size_t>(part);
     for (std::size_t i = 0; i < list.size(); ++i) {
         toml::table& table = *list[i].as_table();
         const auto name = table["name"].value<std::string>();
@@ -80,12 +78,9 @@ std::size_t axisOf(std::string_view part)
 void setCoordinate(toml::array& point, std::string_view part, const std::string& key, const KeyValue& value)
 {
     const std::size_t axis = axisOf(part);
-    const auto* const number = std::get_if<double>(&value);
-    const auto* const whole = std::get_if<std::int64_t>(&value);
-    base::failIf(axis == 3 || point.size() != 3 || (number == nullptr && whole == nullptr),
-                 "key '{}': a point has x, y and z, numbers in mm", key);
-    point.replace(point.cbegin() + static_cast<std::ptrdiff_t>(axis),
-                  number != nullptr ? *number : static_cast<double>(*whole));
+    const auto number = numberOf(value);
+    base::failIf(axis == 3 || point.size() != 3 || !number, "key '{}': a point has x, y and z, numbers in mm", key);
+    point.replace(point.cbegin() + static_cast<std::ptrdiff_t>(axis), *number);
 }
 
 // Points that the scene left open, and which coordinates of them were set.
@@ -211,6 +206,7 @@ Procedure readProcedure(toml::table& root)
     return procedure;
 }
 
+// The scene, and the procedure: a plain one where there is none.
 std::pair<datasets::Scene, Procedure> readCase(toml::table root)
 {
     try {
@@ -254,6 +250,15 @@ std::string toText(const KeyValue& value)
         value);
 }
 
+std::optional<double> numberOf(const KeyValue& value)
+{
+    if (const auto* const whole = std::get_if<std::int64_t>(&value)) {
+        return static_cast<double>(*whole);
+    }
+    const auto* const number = std::get_if<double>(&value);
+    return number != nullptr ? std::optional(*number) : std::nullopt;
+}
+
 KeyValue Axis::at(double unit) const
 {
     if (!values.empty()) {
@@ -293,10 +298,8 @@ SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)
         const Axis& axis = plan.axes[a];
         const bool byNumber = plan.design == DesignKind::grid || plan.design == DesignKind::list;
         c.parameters.push_back(byNumber ? axis.level(static_cast<std::size_t>(x)) : axis.at(x));
-        if (const auto* const number = std::get_if<double>(&c.parameters.back())) {
+        if (const auto number = numberOf(c.parameters.back())) {
             c.variables[axis.name] = *number;
-        } else if (const auto* const whole = std::get_if<std::int64_t>(&c.parameters.back())) {
-            c.variables[axis.name] = static_cast<double>(*whole);
         } else {
             for (const KeyValue& value : axis.values) {
                 c.variables[axis.name + "_" + columnOf(toText(value))] = value == c.parameters.back() ? 1 : 0;

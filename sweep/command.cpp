@@ -8,7 +8,7 @@
 #include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
-#include <sweep/local.h>
+#include <sweep/pool.h>
 #include <sweep/report.h>
 #include <sweep/run.h>
 #include <sweep/slurm.h>
@@ -190,7 +190,7 @@ CasesWanted wantedOf(const SweepArguments& o, const SweepPlan& plan)
     CasesWanted wanted{{}, o.retry, o.anyBuild};
     wanted.cases = !o.shard.empty()   ? casesOfShard(o.shard, plan.cases())
                    : !o.cases.empty() ? casesOfList(o.cases, plan.cases())
-                                      : allCases(plan);
+                                      : casesOfShard("1/1", plan.cases());
     return wanted;
 }
 
@@ -269,7 +269,11 @@ void run(const SweepArguments& o)
 {
     base::checkOutputs({o.json}, {o.plan});
     heedSignals();
-    SweepFolder folder(placeOf(o), o.plan, true);
+    const fs::path place = placeOf(o);
+    if (isPart(o) && o.plan.empty() && !fs::exists(place / "plan.toml") && fs::exists(fs::path(o.folder) / "plan.toml")) {
+        copyPlan(o.folder, place);
+    }
+    SweepFolder folder(place, o.plan, true);
     folder.clean();
     const CasesWanted wanted = wantedOf(o, folder.plan());
     const auto cases =
@@ -292,7 +296,7 @@ void merge(const SweepArguments& o)
     const SweepFolder folder(o.folder, o.plan, true);
     PoolResult result;
     result.done = came;
-    const auto missing = conclude(o, folder, result, 0, allCases(folder.plan()));
+    const auto missing = conclude(o, folder, result, 0, casesOfShard("1/1", folder.plan().cases()));
     if (!missing.empty()) {
         throw base::error("{}: {} of {} cases are missing: run them with --cases {}, and merge again", o.folder,
                           missing.size(), folder.plan().cases(), listOfCases(missing));

@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <datasets/scene_text.h>
+#include <volume/fnv.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -39,11 +40,9 @@ std::string textOf(const fs::path& file)
 
 std::string hashOf(const std::string& bytes)
 {
-    std::uint64_t hash = 0xcbf29ce484222325U;
-    for (const char c : bytes) {
-        hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-    }
-    return fmt::format("{} bytes, {:016x}", bytes.size(), hash);
+    volume::Fnv hash;
+    hash.addAll(std::span(bytes));
+    return fmt::format("{} bytes, {:016x}", bytes.size(), hash.value);
 }
 
 json inputsOf(const datasets::Scene& scene)
@@ -77,15 +76,19 @@ double cpuSeconds()
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+std::string lineOf(const json& entry)
+{
+    return entry.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
 // FNV-1a over the entry without its checksum.
 std::string checksumOf(json entry)
 {
     entry.erase("checksum");
-    std::uint64_t hash = 0xcbf29ce484222325U;
-    for (const char c : entry.dump(-1, ' ', false, json::error_handler_t::replace)) {
-        hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-    }
-    return fmt::format("{:016x}", hash);
+    volume::Fnv hash;
+    const std::string text = lineOf(entry);
+    hash.addAll(std::span(text));
+    return fmt::format("{:016x}", hash.value);
 }
 
 // A value of a case's file; throws with its key.
@@ -186,7 +189,7 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
     const json own = ownOf(plan_.text, textOf(folder_ / "scene.toml"));
     for (const auto& [name, hash] : own.items()) {
         // A folder of an older build has no hash.
-        if (about.contains("own") && about["own"].value(name, std::string()) != hash) {
+        if (about.contains("own") && hash != about["own"].value(name, std::string())) {
             throw base::error(
                 "{}: was changed since the sweep began, and the cases that are done are of the old one: bring it "
                 "back, or begin in another folder",
@@ -242,7 +245,7 @@ void SweepFolder::write(const SweepRow& row) const
                {"build", row.build},   {"machine", row.machine}, {"tick_us", 1e6 * row.tickTime},
                {"case_s", row.seconds}};
     // Numbers as they will be read: the checksum is over those.
-    entry = json::parse(entry.dump(-1, ' ', false, json::error_handler_t::replace));
+    entry = json::parse(lineOf(entry));
     entry["checksum"] = checksumOf(entry);
     const fs::path file = caseFile(row.index);
     std::error_code failed;
@@ -250,7 +253,7 @@ void SweepFolder::write(const SweepRow& row) const
     // Named after the process: two may write the same row, and either is whole.
     const fs::path half = file.parent_path() / fmt::format("{}.{}.{}{}", row.index, machineName(), getpid(), unfinished);
     std::ofstream out(half, std::ios::binary);
-    out << entry.dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
+    out << lineOf(entry) << '\n';
     out.close();
     if (out && !failed) {
         fs::rename(half, file, failed);

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -18,6 +19,8 @@ namespace palpate::sweep {
 /// A value of a scene's key.
 using KeyValue = std::variant<double, std::int64_t, bool, std::string>;
 std::string toText(const KeyValue& value);
+/// Nothing of a word, true and false.
+std::optional<double> numberOf(const KeyValue& value);
 /// `key` as a column and a formula name it: letters, digits and _.
 std::string columnOf(std::string key);
 /// An error of a text that nobody wrote, without its place (":63: ") in a file.

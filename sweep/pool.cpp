@@ -1,6 +1,9 @@
 #include <sweep/pool.h>
 
 #include <base/error.h>
+#include <sweep/lock.h>
+
+#include <fmt/format.h>
 
 #include <signal.h>
 #include <sys/mman.h>
@@ -16,6 +19,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <new>
 #include <set>
 #include <stdexcept>
@@ -211,6 +215,30 @@ PoolResult runPool(std::size_t count, int jobs, const PoolWork& work)
         throw std::runtime_error(shared.error.data());
     }
     return {shared.done, std::chrono::duration<double>(Clock::now() - begin).count(), cpuOfChildren() - cpu};
+}
+
+PoolResult runLocally(SweepFolder& folder, const std::vector<std::size_t>& cases, int jobs, const std::string& build,
+                      const std::function<bool(std::size_t, std::size_t)>& told, const std::function<bool()>& abandoned)
+{
+    PoolWork work;
+    work.start = [&] {
+        folder.leaveLock();
+        const auto runner = std::make_shared<CaseRunner>(folder.plan(), build);
+        return [&folder, &cases, &build, runner](std::size_t item) {
+            folder.write(runCase(*runner, folder, cases[item], build));
+        };
+    };
+    work.lost = [&](std::size_t item, int signal) {
+        SweepRow row;
+        row.index = cases[item];
+        row.build = build;
+        row.machine = machineName();
+        row.error = fmt::format("its process was ended by signal {} ({})", signal, strsignal(signal));
+        folder.write(row);
+    };
+    work.told = told;
+    work.abandoned = abandoned;
+    return runPool(cases.size(), jobs, work);
 }
 
 }  // namespace palpate::sweep

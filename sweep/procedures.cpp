@@ -1,4 +1,4 @@
-#include <sweep/procedures.h>
+#include <sweep/procedure.h>
 
 #include <base/error.h>
 #include <base/mapped.h>

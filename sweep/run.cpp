@@ -10,8 +10,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -25,24 +23,15 @@ namespace {
 
 constexpr std::size_t longestName = 100;  // of a folder for a list of cases
 
-std::optional<std::size_t> numberOf(std::string_view text)
-{
-    std::size_t number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
-}
-
 std::pair<std::size_t, std::size_t> partOf(const std::string& shard)
 {
     const auto slash = shard.find('/');
-    const auto k = numberOf(std::string_view(shard).substr(0, slash));
-    const auto n = slash == std::string::npos ? std::nullopt : numberOf(std::string_view(shard).substr(slash + 1));
+    const auto k = base::numberIn<std::size_t>(std::string_view(shard).substr(0, slash));
+    const auto n = base::numberIn<std::size_t>(slash == std::string::npos ? std::string_view()
+                                                                          : std::string_view(shard).substr(slash + 1));
     base::failIf(!k || !n || *k < 1 || *k > *n, "--shard {}: must be K/N, part K of N, with K from 1 to N", shard);
     return {*k, *n};
 }
-
-// The files that make a folder the folder of a plan.
-constexpr std::array<const char*, 3> planFiles{"scene.toml", "sweep.json", "plan.toml"};
 
 void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
 {
@@ -149,13 +138,6 @@ SweepTable writeTables(const SweepFolder& folder, const std::vector<std::optiona
     return table;
 }
 
-std::vector<std::size_t> allCases(const SweepPlan& plan)
-{
-    std::vector<std::size_t> cases(plan.cases());
-    std::iota(cases.begin(), cases.end(), std::size_t{0});
-    return cases;
-}
-
 std::vector<std::size_t> casesOfShard(const std::string& shard, std::size_t cases)
 {
     const auto [k, n] = partOf(shard);
@@ -170,11 +152,10 @@ std::vector<std::size_t> casesOfShard(const std::string& shard, std::size_t case
 std::vector<std::size_t> casesOfList(const std::string& list, std::size_t cases)
 {
     std::set<std::size_t> out;
-    for (const auto part : base::splitAt(',', list)) {
-        const std::string_view text(part);
+    for (const std::string_view text : base::splitAt(',', list)) {
         const auto dash = text.find('-');
-        const auto first = numberOf(text.substr(0, dash));
-        const auto last = dash == std::string_view::npos ? first : numberOf(text.substr(dash + 1));
+        const auto first = base::numberIn<std::size_t>(text.substr(0, dash));
+        const auto last = dash == std::string_view::npos ? first : base::numberIn<std::size_t>(text.substr(dash + 1));
         base::failIf(!first || !last || *first > *last, "--cases {}: must be numbers and ranges, as in 0-9,12", list);
         base::failIf(*last >= cases, "--cases {}: the plan has the cases 0 to {}", list, cases - 1);
         for (std::size_t i = *first; i <= *last; ++i) {
@@ -214,6 +195,14 @@ fs::path casesFolder(const fs::path& folder, const std::vector<std::size_t>& cas
     return folder / "shards" / ("cases-" + name);
 }
 
+void copyPlan(const fs::path& from, const fs::path& to)
+{
+    base::makeFolders(to / "cases");
+    for (const char* const file : {"scene.toml", "sweep.json", "plan.toml"}) {
+        fs::copy_file(from / file, to / file, fs::copy_options::overwrite_existing);
+    }
+}
+
 std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& from, bool anyBuild)
 {
     std::vector<fs::path> parts = from;
@@ -226,11 +215,7 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
     std::sort(parts.begin(), parts.end());
     base::failIf(parts.empty(), "{}: has no shards to merge: give their folders after --merge", folder.native());
     if (!fs::exists(folder / "plan.toml")) {
-        const SweepFolder first(parts.front(), "", false);
-        base::makeFolders(folder / "cases");
-        for (const char* const file : planFiles) {
-            fs::copy_file(first.path() / file, folder / file, fs::copy_options::overwrite_existing);
-        }
+        copyPlan(SweepFolder(parts.front(), "", false).path(), folder);
     }
     const SweepFolder to(folder, "", true);
     to.clean();

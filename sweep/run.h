@@ -25,8 +25,6 @@ std::vector<std::size_t> remainingCases(const SweepFolder& folder, const CasesWa
 /// Writes table.csv and table.db of the rows there are.
 SweepTable writeTables(const SweepFolder& folder, const std::vector<std::optional<SweepRow>>& rows);
 
-/// Every case of a plan.
-std::vector<std::size_t> allCases(const SweepPlan& plan);
 /// Part K of N, "K/N" with K from 1 to N: a run of neighbouring cases, which share models. Parts differ by one case at
 /// most. Throws std::runtime_error for another text.
 std::vector<std::size_t> casesOfShard(const std::string& shard, std::size_t cases);
@@ -40,6 +38,9 @@ std::string listOfCases(const std::vector<std::size_t>& sorted);
 std::filesystem::path shardFolder(const std::filesystem::path& folder, const std::string& shard);
 /// Where a run on some cases works: FOLDER/shards/cases-LIST.
 std::filesystem::path casesFolder(const std::filesystem::path& folder, const std::vector<std::size_t>& cases);
+
+/// Makes `to` a folder of the same sweep, without cases.
+void copyPlan(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Takes the rows of the folders `from` and of FOLDER/shards/* into `folder`, which is made where it holds no sweep, and
 /// held while this goes on. A case that is done in several places is the same in all; one that failed here and is done

@@ -6,7 +6,7 @@
 #include <haptics/replay.h>
 #include <session/open.h>
 #include <sweep/formula.h>
-#include <sweep/procedures.h>
+#include <sweep/procedure.h>
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>

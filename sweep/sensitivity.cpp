@@ -58,24 +58,6 @@ std::vector<SobolIndex> indicesOf(const std::vector<Sample>& samples, std::span<
     return variance > rounding * rounding * mean * mean ? out : std::vector<SobolIndex>();
 }
 
-// Mean ranks from 1 up.
-std::vector<double> ranksOf(std::span<const double> values)
-{
-    std::vector<std::size_t> order(values.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::sort(order, {}, [&](std::size_t i) { return values[i]; });
-    std::vector<double> rank(values.size());
-    for (std::size_t first = 0, last = 0; first < order.size(); first = last) {
-        while (last < order.size() && values[order[last]] == values[order[first]]) {
-            ++last;
-        }
-        for (std::size_t i = first; i < last; ++i) {
-            rank[order[i]] = 0.5 * static_cast<double>(first + 1 + last);
-        }
-    }
-    return rank;
-}
-
 }  // namespace
 
 std::vector<SobolIndex> sobolIndices(std::span<const double> outputs, std::size_t axes)
@@ -170,19 +152,6 @@ double mainEffect(std::span<const double> outputs, std::span<const std::size_t> 
         between += count[l] > 0 ? sum[l] * sum[l] / count[l] : 0.0;
     }
     return varies(outputs) ? between / variance : std::numeric_limits<double>::quiet_NaN();
-}
-
-double rankCorrelation(std::span<const double> x, std::span<const double> y)
-{
-    const auto a = ranksOf(x), b = ranksOf(y);
-    const double mean = 0.5 * static_cast<double>(a.size() + 1);
-    double ab = 0, aa = 0, bb = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        ab += (a[i] - mean) * (b[i] - mean);
-        aa += (a[i] - mean) * (a[i] - mean);
-        bb += (b[i] - mean) * (b[i] - mean);
-    }
-    return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace palpate::sweep

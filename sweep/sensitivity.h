@@ -34,7 +34,4 @@ std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<cons
 /// `level[i]` is the value's index at output i.
 double mainEffect(std::span<const double> outputs, std::span<const std::size_t> level);
 
-/// Spearman's rank correlation; equal values share their mean rank. NaN when either does not vary.
-double rankCorrelation(std::span<const double> x, std::span<const double> y);
-
 }  // namespace palpate::sweep

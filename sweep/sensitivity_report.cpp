@@ -1,6 +1,7 @@
 #include <sweep/report.h>
 
 #include <base/mapped.h>
+#include <base/rank_correlation.h>
 #include <sweep/sensitivity.h>
 
 #include <nlohmann/json.hpp>
@@ -70,31 +71,19 @@ std::vector<std::vector<double>> byShare(const SweepPlan& plan, const std::vecto
     return out;
 }
 
-double coordinate(const SweepPlan& plan, std::size_t point, std::size_t axis)
-{
-    const KeyValue value = sweepPoint(plan, point * plan.repeats).parameters[axis];
-    if (const auto* const v = std::get_if<double>(&value)) {
-        return *v;
-    }
-    if (const auto* const v = std::get_if<std::int64_t>(&value)) {
-        return static_cast<double>(*v);
-    }
-    return std::numeric_limits<double>::quiet_NaN();
-}
-
 std::vector<std::vector<double>> byRank(const SweepPlan& plan, const std::vector<double>& means)
 {
     std::vector<std::vector<double>> out;
     for (std::size_t a = 0; a < plan.axes.size(); ++a) {
         std::vector<double> x, y;
         for (std::size_t p = 0; p < means.size(); ++p) {
-            const double at = coordinate(plan, p, a);
-            if (std::isfinite(at) && std::isfinite(means[p])) {
-                x.push_back(at);
+            const auto at = numberOf(sweepPoint(plan, p * plan.repeats).parameters[a]);
+            if (at && std::isfinite(means[p])) {
+                x.push_back(*at);
                 y.push_back(means[p]);
             }
         }
-        const double r = x.size() > 2 ? rankCorrelation(x, y) : std::numeric_limits<double>::quiet_NaN();
+        const double r = x.size() > 2 ? base::rankCorrelation(x, y) : std::numeric_limits<double>::quiet_NaN();
         out.push_back({std::abs(r), r});
     }
     return out;

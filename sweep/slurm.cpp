@@ -4,8 +4,8 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
-#include <sweep/local.h>
 #include <sweep/lock.h>
+#include <sweep/pool.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

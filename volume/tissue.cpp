@@ -1,4 +1,5 @@
 #include <volume/tissue.h>
+
 #include <volume/tissue_impl.h>
 
 #include <tbb/blocked_range.h>
@@ -263,6 +264,35 @@ double Tissue::Reader::youngsModulus(Vec3 p) const noexcept
 {
     openvdb::Coord ijk;
     return impl_->voxel(p, ijk) ? 1e3 * static_cast<double>(impl_->stiffness.getValue(ijk)) : 0.0;
+}
+
+namespace {
+
+constexpr std::array<std::string_view, 6> roleNames = {"plain", "skin", "tumour", "vital", "bone", "air"};
+
+}  // namespace
+
+std::string_view name(Role role) noexcept
+{
+    return roleNames[static_cast<std::size_t>(role)];
+}
+
+std::optional<Role> roleNamed(std::string_view name) noexcept
+{
+    const auto at = std::find(roleNames.begin(), roleNames.end(), name);
+    if (at == roleNames.end()) {
+        return std::nullopt;
+    }
+    return static_cast<Role>(at - roleNames.begin());
+}
+
+std::optional<std::uint8_t> TissueTable::find(std::string_view wanted) const noexcept
+{
+    const auto at = std::find_if(rows.begin(), rows.end(), [&](const TissueRow& row) { return row.name == wanted; });
+    if (at == rows.end()) {
+        return std::nullopt;
+    }
+    return static_cast<std::uint8_t>(at - rows.begin());
 }
 
 }  // namespace palpate::volume

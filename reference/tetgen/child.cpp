@@ -1,6 +1,6 @@
 #include <reference/tetgen/child.h>
 
-#include <base/quiet_child.h>
+#include <base/process.h>
 #include <reference/tetgen_job.h>
 
 #include <tetgen.h>

@@ -10,7 +10,7 @@ namespace palpate::report {
 /// Points of one kind, under one name in the legend. `x` and `y` have the same length and any order.
 struct ChartSeries {
     std::string name;
-    std::vector<double> x, y;
+    std::vector<double> x{}, y{};
     bool line = false;                   // joined in their order; separate points otherwise
     bool markers = true;                 // false: a line alone
     std::vector<std::string> label{};    // what each point is, for who points at it; empty, or as long as x
@@ -27,9 +27,9 @@ struct ChartLine {
 struct Chart {
     std::string title, xLabel, yLabel;
     bool logX = false, logY = false;
-    std::vector<ChartSeries> series;
-    std::vector<ChartLine> bounds;
-    std::string note;  // below the chart; may have several lines
+    std::vector<ChartSeries> series{};
+    std::vector<ChartLine> bounds{};
+    std::string note{};  // below the chart; may have several lines
 };
 
 /// Draws a chart for a paper: PNG, the plot 1100 x 720 pixels, its legend beside it. gnuplot is run for it (Debian's

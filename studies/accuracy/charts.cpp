@@ -103,10 +103,7 @@ report::ChartSeries frontOf(const report::Chart& chart)
             longest = std::max(longest, s.x[i]);
         }
     }
-    report::ChartSeries front;
-    front.name = "best within the time (Pareto front)";
-    front.line = true;
-    front.markers = false;
+    report::ChartSeries front{"best within the time (Pareto front)", {}, {}, true, false};
     for (const std::size_t i : paretoFront(points)) {
         if (!front.y.empty()) {
             front.x.push_back(points[i].seconds);
@@ -135,8 +132,7 @@ report::ChartSeries deadlineOf(const report::Chart& chart)
     for (const report::ChartLine& b : chart.bounds) {
         include(b.y);
     }
-    report::ChartSeries line;
-    line.name = "1 kHz: 1000 us per update";
+    report::ChartSeries line{"1 kHz: 1000 us per update"};
     line.x = {deadline, deadline};
     line.y = {low, high};
     line.line = true;
@@ -146,12 +142,10 @@ report::ChartSeries deadlineOf(const report::Chart& chart)
 
 report::Chart chartOf(const json& figures, const View& view)
 {
-    report::Chart chart;
-    chart.title = fmt::format("{}{}: error against time, {} reference", view.scene, view.title,
-                              view.law == "neo-hookean" ? "neo-Hookean" : view.law);
-    chart.xLabel = "processor time per update [us]";
-    chart.yLabel = "error within 30 mm of the contact [% of the largest displacement]";
-    chart.logX = chart.logY = true;
+    report::Chart chart{fmt::format("{}{}: error against time, {} reference", view.scene, view.title,
+                                    view.law == "neo-hookean" ? "neo-Hookean" : view.law),
+                        "processor time per update [us]",
+                        "error within 30 mm of the contact [% of the largest displacement]", true, true};
     for (const json& e : figures.at("chart")) {
         if (!shown(e, view)) {
             continue;

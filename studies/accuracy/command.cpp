@@ -1,9 +1,8 @@
-#include <studies/accuracy/command.h>
-
 #include <base/build.h>
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -11,12 +10,10 @@
 #include <studies/accuracy/conforming.h>
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
-#include <studies/accuracy/installed_rivals.h>
-#include <studies/accuracy/log.h>
 #include <studies/accuracy/references.h>
 #include <studies/accuracy/rival.h>
-#include <studies/accuracy/verify.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/commands.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -51,6 +48,30 @@ struct AccuracyArguments {
     double speed = DeepCommand{}.speed;                          // the same [mm/s]
 };
 
+struct Known {
+    const char* name;
+    const char* program;  // of ours
+    const char* needs;    // another one; "" = none
+    const char* setting;
+    std::vector<double> spacings;  // [m]
+};
+
+const Known known[]{{"bullet", "palpate-rival-bullet", "", "explicit, Poisson 0.45", {6e-3, 4e-3}},
+                    {"calculix", "palpate-rival-calculix", "ccx", "quadratic", {12e-3, 8e-3}}};
+
+// Solvers of others for which we have a program, and which are installed here: Bullet's deformable bodies and CalculiX.
+std::vector<Rival> installedRivals()
+{
+    std::vector<Rival> rivals;
+    for (const Known& k : known) {
+        const std::filesystem::path program = ourProgram(k.program);
+        if (!program.empty() && (*k.needs == '\0' || !ourProgram(k.needs).empty())) {
+            rivals.push_back({k.name, base::shellWord(program.string()), k.setting, k.spacings});
+        }
+    }
+    return rivals;
+}
+
 // A subject with its references, one per law.
 struct Solved {
     std::string scene;
@@ -77,6 +98,34 @@ std::string shortName(const std::string& what)
     return std::filesystem::path(what).stem().string();
 }
 
+// All of ours; conforming tetrahedra where palpate-mesh is installed: asked for by name, or all methods without --quick.
+std::vector<Baseline> methodsOf(const AccuracySubject& subject, const AccuracyArguments& o)
+{
+    std::vector<Baseline> methods = accuracyMethods(subject);
+    const std::filesystem::path mesher = ourProgram("palpate-mesh");
+    const bool wanted = std::ranges::find(o.methods, "tets_conforming") != o.methods.end();
+    if (!mesher.empty() && (wanted || !o.quick)) {
+        std::ranges::move(conformingMethods(subject, mesher), std::back_inserter(methods));
+    }
+    return methods;
+}
+
+// Throws for a name of --methods that neither these nor an installed rival has.
+void checkMethods(const std::vector<Baseline>& all, const AccuracyArguments& o)
+{
+    std::set<std::string> names;
+    for (const Baseline& b : all) {
+        names.insert(b.method);
+    }
+    for (const Rival& rival : installedRivals()) {
+        names.insert(rival.name);
+    }
+    for (const std::string& name : o.methods) {
+        base::failIf(!names.contains(name), "--methods {}: there is no such method; there are {}", name,
+                     fmt::join(names, ", "));
+    }
+}
+
 Solved solved(const std::string& what, const AccuracyArguments& o, command::Progress& progress)
 {
     progress.show(what + ": volume");
@@ -84,6 +133,7 @@ Solved solved(const std::string& what, const AccuracyArguments& o, command::Prog
     changes.model = "spring";  // each method makes its own body
     auto model = std::make_shared<const haptics::SessionModel>(session::openSession(what, changes));
     Solved out{shortName(what), accuracySubject(std::move(model)), {}};
+    checkMethods(methodsOf(out.subject, o), o);  // before minutes of solving
     const ReferenceFolders folders = referenceFolders(o.references);
     const auto tell = [&](const std::string& now) {
         progress.clear();
@@ -103,20 +153,10 @@ Solved solved(const std::string& what, const AccuracyArguments& o, command::Prog
     return out;
 }
 
-// What is run of all methods, in their order. Throws for a name that neither they nor an installed rival has.
+// What is run of all methods, in their order.
 std::vector<Baseline> chosen(std::vector<Baseline> all, const AccuracyArguments& o)
 {
-    std::set<std::string> names, taken;
-    for (const Baseline& b : all) {
-        names.insert(b.method);
-    }
-    for (const Rival& rival : installedRivals()) {
-        names.insert(rival.name);
-    }
-    for (const std::string& name : o.methods) {
-        base::failIf(!names.contains(name), "--methods {}: there is no such method; there are {}", name,
-                     fmt::join(names, ", "));
-    }
+    std::set<std::string> taken;
     std::erase_if(all, [&](const Baseline& b) {
         const bool wanted = o.methods.empty() || std::ranges::find(o.methods, b.method) != o.methods.end();
         const bool named = b.setting == "fast" || b.setting == "default";
@@ -158,20 +198,9 @@ std::vector<Rival> allRivals(const AccuracyArguments& o)
     return rivals;
 }
 
-// Where palpate-mesh is installed: asked for by name, or all methods without --quick.
-void addConforming(const AccuracySubject& subject, const AccuracyArguments& o, std::vector<Baseline>& methods)
-{
-    const std::filesystem::path mesher = ourProgram("palpate-mesh");
-    const bool wanted = std::ranges::find(o.methods, "tets_conforming") != o.methods.end();
-    if (!mesher.empty() && (wanted || !o.quick)) {
-        std::ranges::move(conformingMethods(subject, mesher), std::back_inserter(methods));
-    }
-}
-
 std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const AccuracyArguments& o)
 {
-    std::vector<Baseline> methods = accuracyMethods(s.subject);
-    addConforming(s.subject, o, methods);
+    std::vector<Baseline> methods = methodsOf(s.subject, o);
     for (const Rival& rival : rivals) {
         base::failIf(std::ranges::find(methods, rival.name, &Baseline::method) != methods.end(),
                      "--rival: {} is a method of this command: write another NAME=COMMAND", rival.name);

@@ -3,7 +3,6 @@
 #include <base/error.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
-#include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
 #include <studies/kernel/baselines/factored.h>
 

@@ -2,8 +2,8 @@
 
 #include <base/mapped.h>
 #include <chainmail/elastic.h>
-#include <studies/accuracy/contact_formulas.h>
 #include <studies/accuracy/deep_press.h>
+#include <studies/accuracy/elastic_formulas.h>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>

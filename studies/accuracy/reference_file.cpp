@@ -23,6 +23,8 @@
 // differences from position to position, the bytes of equal rank together: on a lattice most of them are zero.
 namespace palpate::studies {
 
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ReferenceInfo, key, scene, tool, law, elements, speed, tets, unknowns, seconds, program)
+
 namespace {
 
 using nlohmann::json;
@@ -148,9 +150,7 @@ ReferenceState stateOf(const json& in, std::size_t count)
 
 json infoJson(const ReferenceInfo& i)
 {
-    json out{{"key", i.key},           {"scene", i.scene},    {"tool", i.tool}, {"law", i.law},
-             {"elements", i.elements}, {"speed", i.speed},    {"tets", i.tets}, {"unknowns", i.unknowns},
-             {"seconds", i.seconds},   {"program", i.program}};
+    json out = i;
     if (i.press) {
         out["body"] = i.body;
         out["press"] = {{"start", vectorJson(i.press->start)},
@@ -163,16 +163,7 @@ json infoJson(const ReferenceInfo& i)
 
 ReferenceInfo infoOf(const json& in)
 {
-    ReferenceInfo i;
-    for (const auto& [name, text] :
-         {std::pair("key", &i.key), std::pair("scene", &i.scene), std::pair("tool", &i.tool), std::pair("law", &i.law),
-          std::pair("elements", &i.elements), std::pair("program", &i.program)}) {
-        *text = in.at(name).get<std::string>();
-    }
-    i.speed = in.at("speed").get<double>();
-    i.tets = in.at("tets").get<std::size_t>();
-    i.unknowns = in.at("unknowns").get<std::size_t>();
-    i.seconds = in.at("seconds").get<double>();
+    auto i = in.get<ReferenceInfo>();
     if (const auto press = in.find("press"); press != in.end()) {
         i.body = in.at("body").get<std::string>();
         i.press = {vectorOf(press->at("start")), vectorOf(press->at("inward")), vectorOf(press->at("sideways")),
@@ -274,30 +265,6 @@ void addTissue(volume::Fnv& hash, const volume::Tissue& tissue, double poissonCa
     hash.add(length);
 }
 
-std::string keyOf(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
-                  double poissonCap, bool withPress)
-{
-    volume::Fnv hash;
-    hash.add(referenceVersion);
-    hash.addText(law);
-    addLength(hash, speed);
-    hash.add(path.tool.kind);
-    for (const double length : {path.tool.radius, path.tool.length, withPress ? path.press : 0.0, path.drag, path.gap}) {
-        addLength(hash, length);
-    }
-    if (withPress) {
-        addVector(hash, path.start, 1e-6);
-        addVector(hash, path.inward, 1e-5);
-        addVector(hash, path.sideways, 1e-5);
-    }
-    for (const chainmail::Tie& tie : path.ties) {
-        addVector(hash, tie.rest, 1e-6);
-        addVector(hash, Vec3(tie.along, tie.across, 0.0), 1e-3);
-    }
-    addTissue(hash, tissue, poissonCap);
-    return fmt::format("{:016x}", hash.value);
-}
-
 }  // namespace
 
 void saveReference(const std::filesystem::path& file, const Reference& reference, const ReferenceInfo& info)
@@ -329,15 +296,27 @@ std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& f
 }
 
 std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
-                         double poissonCap)
+                         double poissonCap, bool withPress)
 {
-    return keyOf(tissue, path, speed, law, poissonCap, true);
-}
-
-std::string bodyKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
-                    double poissonCap)
-{
-    return keyOf(tissue, path, speed, law, poissonCap, false);
+    volume::Fnv hash;
+    hash.add(referenceVersion);
+    hash.addText(law);
+    addLength(hash, speed);
+    hash.add(path.tool.kind);
+    for (const double length : {path.tool.radius, path.tool.length, withPress ? path.press : 0.0, path.drag, path.gap}) {
+        addLength(hash, length);
+    }
+    if (withPress) {
+        addVector(hash, path.start, 1e-6);
+        addVector(hash, path.inward, 1e-5);
+        addVector(hash, path.sideways, 1e-5);
+    }
+    for (const chainmail::Tie& tie : path.ties) {
+        addVector(hash, tie.rest, 1e-6);
+        addVector(hash, Vec3(tie.along, tie.across, 0.0), 1e-3);
+    }
+    addTissue(hash, tissue, poissonCap);
+    return fmt::format("{:016x}", hash.value);
 }
 
 ReferencePress pressOf(const TrialPath& path)

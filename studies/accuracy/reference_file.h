@@ -32,7 +32,7 @@ struct ReferenceInfo {
     std::size_t unknowns = 0;
     double seconds = 0;                   // CPU time of the solution [s]
     std::string program;                  // that solved it, with its version
-    std::string body;                     // key without the press, see bodyKey(); "" in files of before November 2026
+    std::string body;                     // key without the press, see referenceKey(); "" in files of before November 2026
     std::optional<ReferencePress> press;  // none in files of before November 2026
 };
 
@@ -43,12 +43,10 @@ std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& f
 
 /// Content hash of everything that the solution depends on: voxels (tissues, affine), tissue table, path, speed, law,
 /// referenceVersion, and the bound of Poisson's ratio. 16 hexadecimal digits.
+/// @param withPress  false: what presses which body, without ReferencePress. A scene's entry lies on the surface that is
+///                   read from the voxels, and moves by hundredths of a millimetre when that is read otherwise
 std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
-                         double poissonCap = 0.49);
-/// The same without ReferencePress: what presses which body. A scene's entry lies on the surface that is read from the
-/// voxels, and moves by hundredths of a millimetre when that is read otherwise.
-std::string bodyKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
-                    double poissonCap = 0.49);
+                         double poissonCap = 0.49, bool withPress = true);
 
 ReferencePress pressOf(const TrialPath& path);
 /// The path with another press. Its ties stay where they are.

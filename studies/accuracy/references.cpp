@@ -71,7 +71,8 @@ bool isNear(const ReferencePress& reference, const TrialPath& path)
 // A file that presses the same body nearly as `subject` does.
 std::optional<fs::path> findNear(const AccuracySubject& subject, const std::string& law, const ReferenceFolders& folders)
 {
-    const std::string body = bodyKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap());
+    const std::string body =
+        referenceKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap(), false);
     for (const fs::path& file : referencesIn(folders)) {
         try {
             const ReferenceInfo info = loadReference(file).second;

@@ -4,9 +4,8 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/split.h>
-#include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include <studies/accuracy/verify.h>
+#include <studies/accuracy/deep.h>
 
 #include <base/error.h>
 #include <command/json.h>

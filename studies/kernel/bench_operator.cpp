@@ -1,7 +1,7 @@
 #include <studies/kernel/bench_operator.h>
 
+#include <chainmail/kernels_sets.h>
 #include <chainmail/window.h>
-#include <studies/kernel/plain_operator.h>
 
 #include <algorithm>
 #include <chrono>
@@ -10,6 +10,16 @@
 
 namespace palpate::studies {
 
+KernelSets kernelSets()
+{
+    using namespace chainmail;
+    KernelSets sets{{kernelsV2.name, kernelsAvx2.name, kernelsAvx512.name}, {}};
+    for (const Kernels* set : supportedKernels()) {
+        sets.runs.emplace_back(set->name);
+    }
+    return sets;
+}
+
 using namespace chainmail;
 
 namespace {
@@ -17,7 +27,6 @@ namespace {
 constexpr double spacing = 2e-3;  // [m]
 constexpr int operatorTries = 15;
 constexpr double nodesPerTry = 2e6;
-constexpr const char* plainName = "plain loops";
 
 // A cube of fat with random displacements.
 struct Cube {
@@ -27,7 +36,7 @@ struct Cube {
         lambda = mu;
         u.assign(layout.fieldSize(), 0.0F);
         out = u;
-        scratch.assign(std::max(layout.scratchSize(), plainScratch(layout)), 0.0F);
+        scratch.assign(layout.scratchSize(), 0.0F);
         std::mt19937 random(1);
         std::uniform_real_distribution<float> shift(-1e-4F, 1e-4F);
         constexpr float scaled = static_cast<float>(1e3 * spacing / 32.0);
@@ -120,13 +129,6 @@ OperatorBench benchOperator(const std::vector<int>& windows)
     }
     for (const int window : windows) {
         Cube cube(window);
-        const bool avx2 = __builtin_cpu_supports("avx2") != 0;
-        if (avx2) {
-            const double seconds = secondsPerNode(cube, [&] {
-                plainApply(cube.layout, cube.stiffness(), cube.u.data(), cube.out.data(), cube.scratch.data());
-            });
-            bench.cases.push_back(timed(plainName, false, cube, machineRates("AVX2"), seconds));
-        }
         for (std::size_t i = 0; i < bench.sets.size(); ++i) {
             timeSet(*supportedKernels()[i], bench.sets[i].rates, cube, bench.cases);
         }

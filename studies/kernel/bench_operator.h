@@ -7,6 +7,14 @@
 
 namespace palpate::studies {
 
+/// Instruction sets that level `elastic` is compiled for, narrowest first. Forces have the same bits in all.
+struct KernelSets {
+    std::vector<std::string> built;
+    std::vector<std::string> runs;  // those that this machine has
+};
+
+KernelSets kernelSets();
+
 /// What the operator has to do for one cell, counted from the formulas of chainmail/kernels.h as they are factored there.
 struct OperatorCost {
     double additions = 0;
@@ -17,7 +25,7 @@ OperatorCost operatorCost(bool finiteStrain) noexcept;
 
 /// One timing of the operator on one window.
 struct OperatorCase {
-    std::string set;  // instruction set, or "plain loops"
+    std::string set;  // instruction set
     bool finiteStrain = false;
     int window = 0;             // nodes along each side
     double secondsPerNode = 0;  // measured
@@ -40,8 +48,7 @@ struct OperatorBench {
     std::vector<OperatorCase> cases;  // the widest set's come last
 };
 
-/// Times every instruction set that this machine has, and plain loops where it has AVX2, on cubes of these nodes along each
-/// side. The bound of plain loops is that of AVX2.
+/// Times every instruction set that this machine has on cubes of these nodes along each side.
 OperatorBench benchOperator(const std::vector<int>& windows);
 
 /// The case of this set, window and strain. Throws std::out_of_range.

@@ -1,4 +1,4 @@
-#include <studies/kernel/command.h>
+#include <studies/commands.h>
 
 #include <base/error.h>
 #include <base/mapped.h>

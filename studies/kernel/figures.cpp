@@ -210,11 +210,8 @@ report::Chart errorChart(const std::vector<KernelCase>& cases, const char* what,
             list.add("chainmail", false, 1e6 * c.rivals->chainMail.mean, medianOf(c.rivals->chainMail, figure));
         }
     }
-    report::Chart chart;
-    chart.title = fmt::format("Level elastic: {} against time", what);
-    chart.xLabel = "time per tick, mean [us]";
-    chart.yLabel = fmt::format("{} [%]", what);
-    chart.logX = chart.logY = true;
+    report::Chart chart{fmt::format("Level elastic: {} against time", what), "time per tick, mean [us]",
+                        fmt::format("{} [%]", what), true, true};
     chart.series = list.take();
     chart.bounds.push_back({fmt::format("{:g} %", bound), bound});
     chart.note =

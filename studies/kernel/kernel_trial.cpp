@@ -2,7 +2,6 @@
 
 #include <base/mapped.h>
 #include <base/processor_time.h>
-#include <studies/kernel/trial_errors.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

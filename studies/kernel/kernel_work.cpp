@@ -2,7 +2,9 @@
 
 #include <studies/kernel/bench_operator.h>
 
+#include <algorithm>
 #include <array>
+#include <string_view>
 
 namespace palpate::studies {
 
@@ -10,32 +12,11 @@ namespace {
 
 using namespace chainmail;
 
-enum class Operation : std::uint8_t {
-    apply,
-    residualOf,
-    smoothOf,
-    applyFinite,
-    dots,
-    combine,
-    warmStart,
-    direct,
-    keepStep,
-    negate,
-    smoothFirst,
-    smooth,
-    chebyshev,
-    blend,
-    addMasked,
-    average,
-    hat,
-    spread,
-    gatherAdd,
-    count
-};
-constexpr auto operations = static_cast<std::size_t>(Operation::count);
+constexpr std::size_t operations = 19;
+constexpr std::size_t operators = 4;  // of them, the first ones
 
 struct Meaning {
-    const char* name;
+    std::string_view name;
     const char* purpose;
 };
 constexpr std::array<Meaning, operations> meanings{{
@@ -67,31 +48,20 @@ struct Tally {
 std::array<Tally, operations> tallies;
 const Kernels* counted = nullptr;
 
-void add(Operation operation, double nodes, double floats) noexcept
+// So many nodes, and so many floats of each, read and written.
+void add(std::string_view operation, auto nodes, double perNode) noexcept
 {
-    Tally& t = tallies[static_cast<std::size_t>(operation)];
+    const auto* const at = std::ranges::find(meanings, operation, &Meaning::name);
+    Tally& t = tallies[static_cast<std::size_t>(at - meanings.begin())];
     t.calls += 1;
-    t.nodes += nodes;
-    t.floats += floats;
-}
-
-// An operation on whole windows: so many floats per node, read and written.
-void whole(Operation operation, const Layout& layout, double perNode) noexcept
-{
-    const auto nodes = static_cast<double>(layout.count);
-    add(operation, nodes, perNode * nodes);
+    t.nodes += static_cast<double>(nodes);
+    t.floats += perNode * static_cast<double>(nodes);
 }
 
 // A pass over `n` floats of fields with three components, so many fields read and written.
-void pass(Operation operation, std::size_t n, double fields) noexcept
+void pass(std::string_view operation, auto n, double fields) noexcept
 {
-    add(operation, static_cast<double>(n) / 3, fields * static_cast<double>(n));
-}
-
-// A pass over `count` nodes with three components, and masks or diagonals of one: so many floats per node.
-void masked(Operation operation, std::size_t count, double perNode) noexcept
-{
-    add(operation, static_cast<double>(count), perNode * static_cast<double>(count));
+    add(operation, static_cast<double>(n) / 3, 3 * fields);
 }
 
 constexpr double operatorFloats = 8;  // displacement, two moduli, result
@@ -99,21 +69,21 @@ constexpr double operatorFloats = 8;  // displacement, two moduli, result
 void countOperators(Kernels& k) noexcept
 {
     k.apply = [](const Layout& l, CellStiffness s, const float* u, float* out, float* scratch) noexcept {
-        whole(Operation::apply, l, operatorFloats);
+        add("apply", l.count, operatorFloats);
         counted->apply(l, s, u, out, scratch);
     };
     k.residualOf = [](const Layout& l, CellStiffness s, const float* open, const float* r, const float* u, float* out,
                       float* scratch) noexcept {
-        whole(Operation::residualOf, l, operatorFloats + 4);
+        add("residualOf", l.count, operatorFloats + 4);
         counted->residualOf(l, s, open, r, u, out, scratch);
     };
     k.smoothOf = [](const Layout& l, CellStiffness s, const Smoother& by, float* u, float* out, float* scratch) noexcept {
-        whole(Operation::smoothOf, l, operatorFloats + 7);
+        add("smoothOf", l.count, operatorFloats + 7);
         counted->smoothOf(l, s, by, u, out, scratch);
     };
     k.applyFinite = [](const Layout& l, CellStiffness s, float inverse, const float* u, float* out,
                        float* scratch) noexcept {
-        whole(Operation::applyFinite, l, operatorFloats);
+        add("applyFinite", l.count, operatorFloats);
         return counted->applyFinite(l, s, inverse, u, out, scratch);
     };
 }
@@ -121,48 +91,48 @@ void countOperators(Kernels& k) noexcept
 void countPasses(Kernels& k) noexcept
 {
     k.dots = [](const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept {
-        pass(Operation::dots, n, a == b ? 2 : 3);
+        pass("dots", n, a == b ? 2 : 3);
         counted->dots(x, a, b, n, sums);
     };
     k.combine = [](const float* x, float a, const float* y, float* out, std::size_t n) noexcept {
-        pass(Operation::combine, n, 3);
+        pass("combine", n, 3);
         counted->combine(x, a, y, out, n);
     };
     k.warmStart = [](float step, const StepFields& to, std::size_t n) noexcept {
-        pass(Operation::warmStart, n, 4 + 5);
+        pass("warmStart", n, 4 + 5);
         counted->warmStart(step, to, n);
     };
     k.direct = [](const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept {
-        pass(Operation::direct, n, 3 + 2);
+        pass("direct", n, 3 + 2);
         counted->direct(z, beta, last, step, to, n);
     };
     k.keepStep = [](const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept {
-        pass(Operation::keepStep, n, 6 + 7);
+        pass("keepStep", n, 6 + 7);
         counted->keepStep(step, f, to, n, sums);
     };
     k.negate = [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
-        masked(Operation::negate, count, 1 + 3 + 6);
+        add("negate", count, 1 + 3 + 6);
         return counted->negate(mask, x, y, count);
     };
     k.smoothFirst = [](float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept {
-        masked(Operation::smoothFirst, count, 1 + 3 + 3);
+        add("smoothFirst", count, 1 + 3 + 3);
         counted->smoothFirst(weight, diagonal, r, z, count);
     };
     k.smooth = [](float weight, const float* diagonal, const float* r, const float* q, float* z,
                   std::size_t count) noexcept {
-        masked(Operation::smooth, count, 1 + 6 + 6);
+        add("smooth", count, 1 + 6 + 6);
         counted->smooth(weight, diagonal, r, q, z, count);
     };
     k.chebyshev = [](float shrink, float weight, const Defect& by, float* f, float* z) noexcept {
-        masked(Operation::chebyshev, by.count, 1 + 6 + 12);
+        add("chebyshev", by.count, 1 + 6 + 12);
         counted->chebyshev(shrink, weight, by, f, z);
     };
     k.blend = [](const float* border, const float* x, float* y, std::size_t count) noexcept {
-        masked(Operation::blend, count, 1 + 3 + 6);
+        add("blend", count, 1 + 3 + 6);
         counted->blend(border, x, y, count);
     };
     k.addMasked = [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
-        masked(Operation::addMasked, count, 1 + 3 + 6);
+        add("addMasked", count, 1 + 3 + 6);
         counted->addMasked(mask, x, y, count);
     };
 }
@@ -170,19 +140,19 @@ void countPasses(Kernels& k) noexcept
 void countTransfers(Kernels& k) noexcept
 {
     k.average = [](const float* a, const float* b, float* out, std::size_t n) noexcept {
-        pass(Operation::average, n, 3);
+        pass("average", n, 3);
         counted->average(a, b, out, n);
     };
     k.hat = [](const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept {
-        pass(Operation::hat, n, 4);
+        pass("hat", n, 4);
         counted->hat(a, b, c, out, n);
     };
     k.spread = [](const float* from, int nodes, float* to) noexcept {
-        add(Operation::spread, nodes / 3.0, 1.5 * nodes);
+        pass("spread", nodes, 1.5);
         counted->spread(from, nodes, to);
     };
     k.gatherAdd = [](const float* from, int nodes, float* to) noexcept {
-        add(Operation::gatherAdd, nodes / 3.0, 2.0 * nodes);
+        pass("gatherAdd", nodes, 2.0);
         counted->gatherAdd(from, nodes, to);
     };
 }
@@ -217,14 +187,12 @@ std::vector<KernelWork> CountedKernels::work(double parts) const
     std::vector<KernelWork> all;
     for (std::size_t i = 0; i < operations; ++i) {
         const Tally& t = tallies[i];
-        const auto operation = static_cast<Operation>(i);
         if (t.calls <= 0.0) {
             continue;
         }
-        const bool isOperator = operation <= Operation::applyFinite;
-        const OperatorCost cell = isOperator ? operatorCost(operation == Operation::applyFinite) : OperatorCost{};
+        const OperatorCost cell = i < operators ? operatorCost(meanings[i].name == "applyFinite") : OperatorCost{};
         const double nodes = t.nodes / parts;
-        all.push_back({meanings[i].name, meanings[i].purpose, t.calls / parts, nodes, nodes * cell.additions,
+        all.push_back({meanings[i].name.data(), meanings[i].purpose, t.calls / parts, nodes, nodes * cell.additions,
                        nodes * cell.multiplications, static_cast<double>(sizeof(float)) * t.floats / parts});
     }
     return all;

@@ -1,7 +1,6 @@
 #include <studies/kernel/machine_rates.h>
 
 #include <base/error.h>
-#include <studies/kernel/machine_rates_sets.h>
 
 #include <algorithm>
 #include <array>

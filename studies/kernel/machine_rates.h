@@ -25,4 +25,8 @@ struct RateLoops {
 /// that is not known.
 MachineRates machineRates(const char* name);
 
+extern const RateLoops ratesV2;
+extern const RateLoops ratesAvx2;
+extern const RateLoops ratesAvx512;
+
 }  // namespace palpate::studies

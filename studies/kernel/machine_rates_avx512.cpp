@@ -1,7 +1,7 @@
 #define PALPATE_LANES 16
 #include <studies/kernel/machine_rates_body.h>
 
-#include <studies/kernel/machine_rates_sets.h>
+#include <studies/kernel/machine_rates.h>
 
 namespace palpate::studies {
 

@@ -1,4 +1,4 @@
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <base/error.h>
 

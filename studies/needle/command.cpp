@@ -1,4 +1,4 @@
-#include <studies/needle/command.h>
+#include <studies/commands.h>
 
 #include <base/outputs.h>
 #include <command/json.h>
@@ -40,28 +40,10 @@ struct Figures {
     Onset onset;
 };
 
-report::Chart emptyChart(const char* title, const char* x, const char* y)
-{
-    report::Chart chart;
-    chart.title = title;
-    chart.xLabel = x;
-    chart.yLabel = y;
-    return chart;
-}
-
-report::ChartSeries lineCalled(std::string name, bool markers = true)
-{
-    report::ChartSeries s;
-    s.name = std::move(name);
-    s.line = true;
-    s.markers = markers;
-    return s;
-}
-
 // A curve from its first point to `last`, at most one point per step.
 report::ChartSeries seriesOf(const NeedleCurve& curve, std::size_t last)
 {
-    report::ChartSeries s = lineCalled(curve.name);
+    report::ChartSeries s{curve.name, {}, {}, true};
     double before = -1.0;
     for (std::size_t i = 0; i < last; ++i) {
         if (std::abs(curve.depth[i] - before) >= chartStep || i + 1 == last) {
@@ -76,7 +58,7 @@ report::ChartSeries seriesOf(const NeedleCurve& curve, std::size_t last)
 // One line up to `top` where each tissue begins, joined along zero.
 report::ChartSeries boundarySeries(const std::vector<NeedleBoundary>& boundaries, double top)
 {
-    report::ChartSeries s = lineCalled("a tissue begins (at rest)", false);
+    report::ChartSeries s{"a tissue begins (at rest)", {}, {}, true, false};
     for (const auto& b : boundaries) {
         s.x.insert(s.x.end(), 3, 1e3 * b.depth);
         s.y.insert(s.y.end(), {0.0, top, 0.0});
@@ -88,8 +70,8 @@ report::ChartSeries boundarySeries(const std::vector<NeedleBoundary>& boundaries
 report::Chart layeredChart(const LayeredNeedle& layered)
 {
     double top = 0.0;
-    report::Chart chart = emptyChart("A 14 G needle through phantom 'layered' and out again", "depth of the hand [mm]",
-                                     "force on the hand against the way in [N]");
+    report::Chart chart{"A 14 G needle through phantom 'layered' and out again", "depth of the hand [mm]",
+                        "force on the hand against the way in [N]"};
     for (const auto& curve : layered.curves) {
         chart.series.push_back(seriesOf(curve, curve.punctures.empty() ? curve.turn : curve.depth.size()));
         top = std::max(top, *std::ranges::max_element(curve.force));
@@ -106,12 +88,12 @@ report::Chart layeredChart(const LayeredNeedle& layered)
 
 report::Chart liverChart(const std::vector<LiverNeedle>& liver)
 {
-    report::Chart chart = emptyChart("A needle into liver", "depth of the hand [mm]", "force on the hand [N]");
+    report::Chart chart{"A needle into liver", "depth of the hand [mm]", "force on the hand [N]"};
     for (const auto& l : liver) {
         chart.series.push_back(seriesOf(l.curve, l.curve.turn));
     }
     const auto add = [&](const char* name, double from, double to, auto force) {
-        report::ChartSeries s = lineCalled(name, false);
+        report::ChartSeries s{name, {}, {}, true, false};
         for (double z = from; z <= to; z += 1e-3) {
             s.x.push_back(1e3 * z);
             s.y.push_back(force(z));
@@ -134,9 +116,9 @@ report::Chart liverChart(const std::vector<LiverNeedle>& liver)
 
 report::Chart onsetChart(const Onset& onset)
 {
-    report::Chart chart = emptyChart("Pressing beside a vessel", "depth of the ball [mm]", "distance [mm]");
+    report::Chart chart{"Pressing beside a vessel", "depth of the ball [mm]", "distance [mm]"};
     const auto add = [&](const char* name, double OnsetPoint::*value) {
-        report::ChartSeries s = lineCalled(name);
+        report::ChartSeries s{name, {}, {}, true};
         for (const auto& p : onset.points) {
             s.x.push_back(1e3 * p.pressed);
             s.y.push_back(1e3 * (p.*value));

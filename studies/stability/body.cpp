@@ -1,6 +1,5 @@
 #include <studies/stability/body.h>
 
-#include <datasets/tables.h>
 #include <volume/label_image.h>
 
 #include <glm/common.hpp>
@@ -8,11 +7,6 @@
 #include <array>
 
 namespace palpate::studies {
-
-std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label)
-{
-    return smallBody(low, high, label, datasets::defaultTissues());
-}
 
 std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label,
                                                 const volume::TissueTable& table)

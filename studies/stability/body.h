@@ -1,5 +1,6 @@
 #pragma once
 
+#include <datasets/tables.h>
 #include <volume/tissue.h>
 
 #include <cstdint>
@@ -13,9 +14,7 @@ enum BodyLabel : std::uint16_t { bodySkin = 1, bodyFat = 2, bodyGland = 3, bodyB
 
 /// The body whose label at p [mm] is `label(p)`, sampled at the middles of voxels of 1 mm between `low` and `high` [mm];
 /// the base is of bone and held in space.
-std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label);
-/// The same of tissues of another table.
 std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label,
-                                                const volume::TissueTable& table);
+                                                const volume::TissueTable& table = datasets::defaultTissues());
 
 }  // namespace palpate::studies

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -12,10 +14,8 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
-#include <exception>
-#include <mutex>
+#include <future>
 #include <set>
-#include <thread>
 
 namespace palpate::studies {
 
@@ -245,7 +245,7 @@ Trace runSession(const Cell& cell, const StabilityScene& scene, const StabilityM
             visit(sample, force, running);
         }
     }
-    trace.residue = running.residue();
+    trace.residue = running.residue ? running.residue() : 0.0;
     return trace;
 }
 
@@ -261,37 +261,20 @@ CellResult runCell(const Cell& cell, const StabilityModels& models)
 void onThreads(std::size_t count, int jobs, const std::function<void(std::size_t)>& work,
                const std::function<void(std::size_t)>& told)
 {
-    std::atomic<std::size_t> next{0}, done{0};
-    std::exception_ptr failed;
-    std::mutex failing;
-    const auto run = [&] {
-        for (std::size_t i = next++; i < count; i = next++) {
-            try {
+    std::atomic<std::size_t> done{0};
+    tbb::task_arena arena(jobs);
+    auto all = std::async(std::launch::async, [&] {
+        arena.execute([&] {
+            tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
                 work(i);
-            } catch (...) {
-                const std::scoped_lock lock(failing);
-                failed = failed ? failed : std::current_exception();
-                next = count;
-            }
-            ++done;
-        }
-    };
-    std::atomic<int> running{jobs};
-    std::vector<std::jthread> threads;
-    for (int t = 0; t < jobs; ++t) {
-        threads.emplace_back([&] {
-            run();
-            --running;
+                ++done;
+            });
         });
+    });
+    while (all.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready) {
+        told(done);
     }
-    while (running > 0) {
-        told(std::min<std::size_t>(done, count));
-        std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-    threads.clear();
-    if (failed) {
-        std::rethrow_exception(failed);
-    }
+    all.get();
 }
 
 }  // namespace palpate::studies

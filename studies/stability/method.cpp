@@ -1,12 +1,92 @@
 #include <studies/stability/method.h>
 
 #include <haptics/contact_law.h>
+#include <haptics/simulation.h>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 
 namespace palpate::studies {
+
+namespace {
+
+std::shared_ptr<haptics::Simulation> simulationOf(const MethodScene& scene)
+{
+    return std::make_shared<haptics::Simulation>(scene.model, haptics::SimulationOptions{scene.period, scene.device});
+}
+
+double furthestNode(const haptics::Simulation& simulation) noexcept
+{
+    double most = 0.0;
+    for (const auto n : simulation.shape().moved()) {
+        most = std::max(most, static_cast<double>(glm::length(simulation.shape().u()[n])));
+    }
+    return most;
+}
+
+// A simulation and what its last tick gave.
+struct Ours {
+    std::shared_ptr<haptics::Simulation> simulation;
+    const haptics::TickRecord* last = nullptr;
+
+    Vec3 tick(const haptics::DeviceSample& sample) noexcept
+    {
+        last = &simulation->tick(sample);
+        return last->total;
+    }
+};
+
+RunningMethod running(const MethodScene& scene)
+{
+    auto ours = std::make_shared<Ours>(Ours{simulationOf(scene)});
+    return {[ours](const haptics::DeviceSample& sample) { return ours->tick(sample); },
+            [ours] { return furthestNode(*ours->simulation); }, [ours] { return ours->last; },
+            [ours] { return ours->last != nullptr ? ours->last->tissueForce : Vec3(0.0); }};
+}
+
+// The force of the last update, held until the next.
+struct Held {
+    std::shared_ptr<haptics::Simulation> simulation;
+    double period, every;
+    double since = 0.0;
+    Vec3 force{0.0};
+
+    Vec3 tick(const haptics::DeviceSample& sample) noexcept
+    {
+        const Vec3 now = simulation->tick(sample).total;
+        since += period;
+        if (since >= every) {
+            since -= every;
+            force = now;
+        }
+        return force;
+    }
+};
+
+}  // namespace
+
+std::vector<StabilityMethod> ourMethods()
+{
+    using datasets::ModelLevel;
+    std::vector<StabilityMethod> out;
+    for (const ModelLevel level : {ModelLevel::elastic, ModelLevel::chainmail, ModelLevel::spring}) {
+        out.push_back({std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), running, level, true});
+    }
+    return out;
+}
+
+// Palpate's force, updated by a tissue model at 60 Hz.
+StabilityMethod lateUpdates()
+{
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        auto held = std::make_shared<Held>(Held{simulationOf(scene), scene.period, 1.0 / 60.0});
+        return {[held](const haptics::DeviceSample& sample) { return held->tick(sample); },
+                [held] { return furthestNode(*held->simulation); }};
+    };
+    return {"late_60hz", start, datasets::ModelLevel::elastic, true};
+}
 
 std::vector<StabilityMethod> stabilityMethods()
 {

@@ -21,19 +21,17 @@ struct MethodScene {
 /// A running method. tick() is called once per period, in order, allocates nothing and does not throw.
 struct RunningMethod {
     std::function<Vec3(const haptics::DeviceSample&)> tick;  // the force on the hand, capped [N]
-    std::function<double()> residue;                         // largest displacement of its tissue now [m]
-    std::function<const haptics::TickRecord*()> record;      // of a Simulation: its last tick; else empty
-    std::function<Vec3()> tissue = {};                       // of a Simulation: force before its controller; else empty
+    std::function<double()> residue = {};  // largest displacement of its tissue now [m]; empty: it has none
+    std::function<const haptics::TickRecord*()> record = {};  // of a Simulation: its last tick; else empty
+    std::function<Vec3()> tissue = {};                        // of a Simulation: force before its controller; else empty
 };
 
 /// Ours, or one that a user might take instead, as its authors would write it: no stabiliser but the cap.
 struct StabilityMethod {
     std::string name;  // "god_object"
-    std::string source;
-    datasets::ModelLevel level = datasets::ModelLevel::spring;  // of the model it runs on
-    bool ours = false;
-    bool pierces = false;  // a needle can pierce its tissue
     std::function<RunningMethod(const MethodScene&)> start;
+    datasets::ModelLevel level = datasets::ModelLevel::spring;  // of the model it runs on
+    bool pierces = false;                                       // a needle can pierce its tissue
 };
 
 /// Ours first, the default level at the front.

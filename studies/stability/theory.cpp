@@ -67,6 +67,12 @@ DeviceParameters ideal(double mass, double viscous)
     return device;
 }
 
+// The largest stiffness K at which an oscillation of 1 mm decays, between a fifth and five times `about` [N/m].
+double stableStiffness(const DeviceParameters& device, const Grip& grip, double damping, double period, double about)
+{
+    return onset(0.2 * about, 5.0 * about, [&](double k) { return grows(device, grip, {k, damping}, 1e-3, period); });
+}
+
 TheoryRow delayRow(double delay, double damping)
 {
     DeviceParameters device = ideal(0.075, 0.5);
@@ -133,17 +139,16 @@ TheoryRow coulombRow(double stiffness)
     return {fmt::format("largest release [mm], Coulomb friction, K {:g} N/m", stiffness), 1e3 * predicted, 1e3 * simulated};
 }
 
+LimitPoint limitAt(double x, double delay, double hand, double period)
+{
+    auto device = ideal(0.075, 0.5);
+    device.delay = delay;
+    const Grip grip{hand > 0.0 ? 0.1 : 0.0, hand, 0.0};
+    const double predicted = (device.viscous + hand) / (0.5 * period + delay);
+    return {x, predicted, stableStiffness(device, grip, 0.0, period, predicted)};
+}
+
 }  // namespace
-
-double stableStiffness(const DeviceParameters& device, const Grip& grip, double damping, double period, double about)
-{
-    return onset(0.2 * about, 5.0 * about, [&](double k) { return grows(device, grip, {k, damping}, 1e-3, period); });
-}
-
-haptics::DeviceParameters idealDevice(double viscous)
-{
-    return ideal(0.075, viscous);
-}
 
 std::vector<TheoryRow> theoryRows()
 {
@@ -162,6 +167,23 @@ std::vector<TheoryRow> theoryRows()
         rows.push_back(coulombRow(stiffness));
     }
     return rows;
+}
+
+std::vector<LimitMap> limitMaps()
+{
+    LimitMap delay{"delay", "delay [ms]", {}};
+    for (const double ms : {0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0}) {
+        delay.points.push_back(limitAt(ms, ms * 1e-3, 0.0, standardPeriod));
+    }
+    LimitMap hand{"damping", "damping of the hand [N s/m]", {}};
+    for (const double damping : {0.0, 0.5, 1.0, 2.0, 3.0, 5.0}) {
+        hand.points.push_back(limitAt(damping, 0.0, damping, standardPeriod));
+    }
+    LimitMap rate{"rate", "rate of the loop [Hz]", {}};
+    for (const double hertz : {60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0}) {
+        rate.points.push_back(limitAt(hertz, 0.0, 0.0, 1.0 / hertz));
+    }
+    return {delay, hand, rate};
 }
 
 }  // namespace palpate::studies

@@ -29,12 +29,20 @@ struct TheoryRow {
 /// Each limit by bisection. Takes about a second.
 std::vector<TheoryRow> theoryRows();
 
-/// The largest stiffness K [N/m] at which an oscillation of 1 mm decays, by bisection between a fifth and five times
-/// `about`. @param damping  B [N s/m]    @param period  T [s]
-double stableStiffness(const haptics::DeviceParameters& device, const haptics::Grip& grip, double damping, double period,
-                       double about);
+/// How much stiffness a loop bears against one thing about it.
+struct LimitPoint {
+    double x = 0;          // in the map's unit
+    double predicted = 0;  // (b + b_hand) / (T / 2 + t_d) [N/m]
+    double simulated = 0;  // [N/m]
+};
 
-/// A device of 75 g with that friction b [N s/m], ideal otherwise.
-haptics::DeviceParameters idealDevice(double viscous);
+struct LimitMap {
+    std::string name, xLabel;  // "delay", "delay [ms]"
+    std::vector<LimitPoint> points;
+};
+
+/// A device of 75 g with 0.5 N s/m of friction on a spring: the largest stable stiffness against delay, the hand's damping
+/// and the rate of the loop. Formula: Gil et al. 2004. Takes seconds.
+std::vector<LimitMap> limitMaps();
 
 }  // namespace palpate::studies

@@ -1,4 +1,4 @@
-#include <studies/stability/trace.h>
+#include <studies/stability/matrix.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

@@ -1,4 +1,4 @@
-#include <studies/thesis/command.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/error.h>
@@ -11,7 +11,7 @@
 #include <datasets/phantom_random.h>
 #include <studies/thesis/figures.h>
 #include <studies/thesis/tasks_scene.h>
-#include <studies/transfer/timeline.h>
+#include <studies/transfer/transfer.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

@@ -296,9 +296,7 @@ namespace {
 
 report::ChartSeries timesOf(const json& events, const char* event, std::string name)
 {
-    report::ChartSeries s;
-    s.name = std::move(name);
-    s.line = true;
+    report::ChartSeries s{std::move(name), {}, {}, true};
     for (const auto& e : events) {
         if (e["event"] == event) {
             s.x.push_back(e["objects"]);
@@ -325,11 +323,8 @@ report::ChartSeries thesisBeyond(const json& figures, double most)
 
 report::Chart chartOf(const json& f)
 {
-    report::Chart chart;
-    chart.title = "Process time of the haptic loop against the number of objects";
-    chart.xLabel = "objects";
-    chart.yLabel = "process time of a tick [us]";
-    chart.logX = chart.logY = true;
+    report::Chart chart{"Process time of the haptic loop against the number of objects", "objects",
+                        "process time of a tick [us]", true, true};
     const auto& thesis = f["thesis"]["events"];
     chart.series.push_back(timesOf(thesis, "A1", "thesis A1: graphics, touching"));
     chart.series.push_back(timesOf(thesis, "A4", "thesis A4: not touching"));
@@ -354,15 +349,10 @@ report::Chart chartOf(const json& f)
 // Where a tick's time goes: tasks of event A8.
 report::Chart tasksChartOf(const json& f)
 {
-    report::Chart chart;
-    chart.title = "Time of single tasks against the number of objects (event A8)";
-    chart.xLabel = "objects";
-    chart.yLabel = "time in a tick, median [us]";
-    chart.logX = chart.logY = true;
+    report::Chart chart{"Time of single tasks against the number of objects (event A8)", "objects",
+                        "time in a tick, median [us]", true, true};
     for (const auto task : haptics::taskNames) {
-        report::ChartSeries s;
-        s.name = task;
-        s.line = true;
+        report::ChartSeries s{std::string(task), {}, {}, true};
         for (const auto& e : f["events"]) {
             if (e["event"] == "A8") {
                 s.x.push_back(e["objects"]);

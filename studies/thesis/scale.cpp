@@ -1,4 +1,4 @@
-#include <studies/thesis/scale.h>
+#include <studies/commands.h>
 
 #include <base/outputs.h>
 #include <command/json.h>

@@ -2,7 +2,7 @@
 
 #include <haptics/broadcast.h>
 #include <haptics/session_model.h>
-#include <studies/thesis/tasks_loop.h>
+#include <studies/thesis/tasks_scene.h>
 #include <studies/thesis/tasks_thesis.h>
 
 #include <array>

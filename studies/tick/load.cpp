@@ -1,4 +1,4 @@
-#include <studies/tick/load.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/outputs.h>

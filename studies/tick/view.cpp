@@ -1,4 +1,4 @@
-#include <studies/tick/view.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/error.h>

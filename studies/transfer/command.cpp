@@ -1,4 +1,4 @@
-#include <studies/transfer/command.h>
+#include <studies/commands.h>
 
 #include <base/child_process.h>
 #include <base/error.h>
@@ -11,7 +11,6 @@
 #include <session/figures.h>
 #include <session/open.h>
 #include <session/trainer.h>
-#include <studies/transfer/timeline.h>
 #include <studies/transfer/transfer.h>
 
 #include <fmt/format.h>

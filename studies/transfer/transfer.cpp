@@ -21,6 +21,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <fstream>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -254,6 +255,22 @@ Transfer measureTransfer(const SessionModel& model, const TransferOptions& optio
     std::this_thread::sleep_for(std::chrono::duration<double>(0.05 + options.setUp));
     transfer.seconds = receiver.seconds();
     return transfer;
+}
+
+namespace fs = std::filesystem;
+
+std::vector<TimelinePicture> readTimeline(const fs::path& file)
+{
+    std::ifstream in(file);
+    std::string head;
+    std::getline(in, head);
+    std::vector<TimelinePicture> pictures;
+    char comma = 0;
+    for (TimelinePicture p; in >> p.tick >> comma >> p.published >> comma >> p.read >> comma >> p.done;) {
+        pictures.push_back(p);
+    }
+    base::failIf(pictures.size() < 2, "a viewer showed no pictures: its message is above");
+    return pictures;
 }
 
 }  // namespace palpate::studies

@@ -3,6 +3,8 @@
 #include <haptics/session_model.h>
 
 #include <cstdint>
+#include <filesystem>
+#include <string>
 #include <vector>
 
 namespace palpate::studies {
@@ -30,5 +32,14 @@ struct TransferOptions {
 ///
 /// Throws std::runtime_error where the process or the pipe cannot be made.
 Transfer measureTransfer(const haptics::SessionModel& model, const TransferOptions& options);
+
+/// A picture of a viewer, by the clock CLOCK_MONOTONIC; see render::Shown.
+struct TimelinePicture {
+    std::uint64_t tick = 0;
+    double published = 0, read = 0, done = 0;  // [s]
+};
+
+/// What `palpate-view --timeline FILE` wrote. Throws std::runtime_error for fewer than two pictures.
+std::vector<TimelinePicture> readTimeline(const std::filesystem::path& file);
 
 }  // namespace palpate::studies

@@ -1,4 +1,4 @@
-#include <studies/validate/beam.h>
+#include <studies/validate/experiment.h>
 
 #include <base/error.h>
 #include <studies/validate/cell_body.h>

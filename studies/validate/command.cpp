@@ -1,4 +1,4 @@
-#include <studies/validate/command.h>
+#include <studies/commands.h>
 
 #include <base/error.h>
 #include <base/outputs.h>
@@ -6,13 +6,9 @@
 #include <command/progress.h>
 #include <datasets/tables.h>
 #include <haptics/scenery.h>
-#include <studies/validate/beam.h>
+#include <studies/validate/experiment.h>
 #include <studies/validate/figures.h>
 #include <studies/validate/measurements.h>
-#include <studies/validate/needle.h>
-#include <studies/validate/palpation.h>
-#include <studies/validate/relaxation.h>
-#include <studies/validate/silicone.h>
 #include <ultrasound/checks.h>
 
 #include <fmt/format.h>

@@ -3,6 +3,7 @@
 #include <base/outputs.h>
 #include <command/json.h>
 #include <report/chart/chart.h>
+#include <report/html.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -26,15 +27,6 @@ const char* wordOf(Verdict verdict)
             break;
     }
     return "not run";
-}
-
-std::string escaped(const std::string& text)
-{
-    std::string out;
-    for (const char c : text) {
-        out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : std::string(1, c);
-    }
-    return out;
 }
 
 std::string quotedCell(const std::string& text)
@@ -66,7 +58,7 @@ std::string tableHtml(const std::vector<Experiment>& experiments)
         for (const std::string& cell :
              {e.name, e.quantity, e.source, e.fittedOn, e.predicted, percent(e, e.error), percent(e, e.worst),
               percent(e, e.scatter), percent(e, e.bound), std::string(wordOf(e.verdict)), e.note}) {
-            out += "<td>" + escaped(cell) + "</td>";
+            out += "<td>" + report::escape(cell) + "</td>";
         }
         out += "</tr>\n";
     }
@@ -75,13 +67,9 @@ std::string tableHtml(const std::vector<Experiment>& experiments)
 
 report::Chart chartOf(const Experiment& e)
 {
-    report::Chart chart;
-    chart.title = e.picture.title;
-    chart.xLabel = e.picture.xLabel;
-    chart.yLabel = e.picture.yLabel;
+    report::Chart chart{e.picture.title, e.picture.xLabel, e.picture.yLabel};
     for (const ValidateCurve& c : e.picture.curves) {
-        report::ChartSeries s;
-        s.name = c.name;
+        report::ChartSeries s{c.name};
         s.x = c.x;
         s.y = c.y;
         s.line = c.line;

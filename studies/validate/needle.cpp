@@ -1,4 +1,4 @@
-#include <studies/validate/needle.h>
+#include <studies/validate/experiment.h>
 
 #include <base/error.h>
 #include <base/mapped.h>

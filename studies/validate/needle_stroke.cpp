@@ -1,6 +1,6 @@
 #include <datasets/tables.h>
 #include <studies/stability/method.h>
-#include <studies/validate/needle_stroke.h>
+#include <studies/validate/experiment.h>
 
 #include <glm/geometric.hpp>
 

@@ -1,11 +1,13 @@
-#include <studies/validate/palpation.h>
+#include <studies/validate/experiment.h>
 
 #include <base/error.h>
+#include <base/rank_correlation.h>
 #include <haptics/session_model.h>
 #include <studies/press/press.h>
 #include <studies/validate/measurements.h>
 
 #include <fmt/format.h>
+#include <boost/math/distributions/normal.hpp>
 
 #include <algorithm>
 #include <array>
@@ -38,27 +40,11 @@ constexpr std::array<Group, 7> groups{{{"f1", "all lumps", 0.0, 0.0},
                                        {"f7", "10 mm hard", 10e-3, 42.5e3},
                                        {"f8", "3 mm soft", 3e-3, 6.4e3}}};
 
-// Places in the order of the values, from 0; ties share their mean.
-std::vector<double> ranks(const std::vector<double>& values)
-{
-    std::vector<double> out;
-    for (const double v : values) {
-        const auto below = std::ranges::count_if(values, [&](double w) { return w < v; });
-        const auto same = std::ranges::count(values, v);
-        out.push_back(static_cast<double>(below) + 0.5 * static_cast<double>(same - 1));
-    }
-    return out;
-}
-
-// z of a fraction of a normal distribution, by halving.
+// z of a fraction of a normal distribution.
 double normalScore(double fraction)
 {
-    double low = -8.0, high = 8.0;
-    for (int i = 0; i < 60; ++i) {
-        const double middle = 0.5 * (low + high);
-        (0.5 * std::erfc(-middle / std::sqrt(2.0)) < fraction ? low : high) = middle;
-    }
-    return low;
+    constexpr double least = 1e-12;
+    return boost::math::quantile(boost::math::normal(), std::clamp(fraction, least, 1.0 - least));
 }
 
 double factOf(const Measurements& facts, const std::string& id, const std::filesystem::path& file)
@@ -102,19 +88,6 @@ double forceOver(const Lump& lump)
     double force = 0.0;
     press(model, path, {}, options, [&](const PressSample& s) { force = -s.force.y; });
     return force;
-}
-
-double rankCorrelation(const std::vector<double>& a, const std::vector<double>& b)
-{
-    const std::vector<double> x = ranks(a), y = ranks(b);
-    const double middle = 0.5 * static_cast<double>(a.size() - 1);
-    double xx = 0.0, xy = 0.0, yy = 0.0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-        xx += (x[i] - middle) * (x[i] - middle);
-        xy += (x[i] - middle) * (y[i] - middle);
-        yy += (y[i] - middle) * (y[i] - middle);
-    }
-    return xy / std::sqrt(xx * yy);
 }
 
 Experiment palpationOrder(const std::filesystem::path& file, const ValidateProgress& progress)
@@ -166,7 +139,7 @@ Experiment palpationOrder(const std::filesystem::path& file, const ValidateProgr
         contrast.push_back(sum / count);
         e.picture.curves.push_back({g.what, {contrast.back()}, {detected.back()}, false});
     }
-    const double correlation = rankCorrelation(detected, contrast);
+    const double correlation = base::rankCorrelation(detected, contrast);
     e.error = e.worst = 1e2 * (1.0 - correlation);
     const double slope = normalScore(detected[1]) - normalScore(detected[2]);
     e.parameters.emplace_back("rank_correlation", correlation);

@@ -1,4 +1,4 @@
-#include <studies/validate/relaxation.h>
+#include <studies/validate/experiment.h>
 
 #include <haptics/session_model.h>
 #include <studies/press/press.h>

@@ -56,6 +56,8 @@ class Scenes(InFolder):
         self.assertEqual(caught.exception.key, "volume.seed")
         with self.assertRaisesRegex(palpate.SceneError, "unknown key"):
             palpate.Scene("block", tool={"radus_mm": 1})
+        with self.assertRaisesRegex(ValueError, "surrogates"):
+            palpate.Model("\udce4")
         with self.assertRaisesRegex(palpate.SceneError, "built-in scenes are"):
             palpate.Scene("blok")
         with self.assertRaisesRegex(palpate.SceneError, "TOML"):

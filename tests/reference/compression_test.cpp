@@ -1,6 +1,6 @@
 #include <reference/box_mesh.h>
 #include <reference/solve.h>
-#include <studies/validate/silicone.h>
+#include <studies/validate/experiment.h>
 
 #include <gtest/gtest.h>
 

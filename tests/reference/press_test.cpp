@@ -1,6 +1,6 @@
+#include <reference/mesh_files.h>
 #include <reference/press_path.h>
 #include <reference/symmetry.h>
-#include <reference/vtu.h>
 #include <tests/studies/small_block.h>
 
 #include <gtest/gtest.h>

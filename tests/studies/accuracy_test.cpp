@@ -1,7 +1,7 @@
 #include <studies/accuracy/accuracy.h>
 #include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>
@@ -228,7 +228,7 @@ struct Shelf {
         ReferenceInfo info = someInfo();
         info.law = law;
         info.key = referenceKey(*subject.model->tissue, path, subject.speed, law);
-        info.body = bodyKey(*subject.model->tissue, path, subject.speed, law);
+        info.body = referenceKey(*subject.model->tissue, path, subject.speed, law, 0.49, false);
         info.press = pressOf(path);
         saveReference(folder / (name + "-" + info.key + ".ref"), {}, info);
     }

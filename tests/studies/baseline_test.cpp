@@ -1,4 +1,3 @@
-#include <studies/kernel/baselines/fifo_mail.h>
 #include <studies/kernel/baselines/lattice.h>
 #include <studies/kernel/kernel_rivals.h>
 #include <studies/kernel/node_values.h>

@@ -1,6 +1,5 @@
 #include <studies/kernel/baselines/baseline.h>
 #include <studies/kernel/baselines/factored.h>
-#include <studies/kernel/baselines/tet_factor.h>
 #include <studies/kernel/baselines/xpbd.h>
 #include <studies/kernel/kernel_rivals.h>
 

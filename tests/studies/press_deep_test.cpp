@@ -1,4 +1,3 @@
-#include <studies/press/pose_load.h>
 #include <studies/press/press.h>
 
 #include <datasets/tables.h>

@@ -2,7 +2,6 @@
 
 #include <haptics/simulation.h>
 #include <studies/kernel/trial_path.h>
-#include <studies/press/pose_load.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>

@@ -1,6 +1,5 @@
 #include <studies/stability/fuzz.h>
 #include <studies/stability/matrix.h>
-#include <studies/stability/trace.h>
 
 #include <tests/allocations.h>
 

@@ -1,5 +1,3 @@
-#include <studies/thesis/tasks_fit.h>
-#include <studies/thesis/tasks_loop.h>
 #include <studies/thesis/tasks_measure.h>
 #include <studies/thesis/tasks_scene.h>
 #include <studies/thesis/tasks_search.h>

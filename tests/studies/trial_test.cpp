@@ -1,5 +1,5 @@
 #include <studies/kernel/kernel_rivals.h>
-#include <studies/kernel/trial_errors.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <tests/studies/small_block.h>
 

@@ -1,10 +1,6 @@
-#include <studies/validate/beam.h>
 #include <studies/validate/cell_body.h>
+#include <studies/validate/experiment.h>
 #include <studies/validate/measurements.h>
-#include <studies/validate/needle.h>
-#include <studies/validate/palpation.h>
-#include <studies/validate/silicone.h>
-#include <studies/validate/yeoh.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>
@@ -171,15 +167,6 @@ TEST(NeedleStroke, HeldForceFollowsTheTissuesSeries)
     for (std::size_t i = 3; i < stroke.in.size(); ++i) {
         EXPECT_NEAR(stroke.in[i], stiff.in[i], 0.07 * stiff.in[i]) << i;
     }
-}
-
-// By hand: d = 1, 1, 0: 1 - 6 * 2 / (4 * 15); ties take the mean of their ranks.
-TEST(RankCorrelation, ByHand)
-{
-    EXPECT_DOUBLE_EQ(rankCorrelation({1, 2, 3}, {10, 20, 90}), 1.0);
-    EXPECT_DOUBLE_EQ(rankCorrelation({1, 2, 3}, {3, 2, 1}), -1.0);
-    EXPECT_NEAR(rankCorrelation({1, 2, 3, 4}, {2, 1, 3, 4}), 0.8, 1e-12);
-    EXPECT_NEAR(rankCorrelation({1, 1, 2}, {5, 5, 9}), 1.0, 1e-12);
 }
 
 TEST(Measurements, MissingAndDamagedFilesSaySo)

@@ -1,4 +1,4 @@
-#include <studies/accuracy/contact_formulas.h>
+#include <studies/accuracy/elastic_formulas.h>
 #include <studies/accuracy/kernel_verification.h>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+#include <base/rank_correlation.h>
 #include <sweep/design.h>
 #include <sweep/sensitivity.h>
 
@@ -233,11 +234,11 @@ TEST(RankCorrelation, SeesOrderOnlyAndSharesTies)
         rising.push_back(std::exp(0.3 * i));
         falling.push_back(-std::pow(i, 3));
     }
-    EXPECT_NEAR(rankCorrelation(x, rising), 1, 1e-12);
-    EXPECT_NEAR(rankCorrelation(x, falling), -1, 1e-12);
+    EXPECT_NEAR(base::rankCorrelation(x, rising), 1, 1e-12);
+    EXPECT_NEAR(base::rankCorrelation(x, falling), -1, 1e-12);
     // Ranks 1.5, 1.5, 3, 4 against 1, 2, 3, 4: Pearson's r of them is 4.5 / sqrt(4.5 * 5).
-    EXPECT_NEAR(rankCorrelation(std::vector<double>{1, 1, 2, 3}, std::vector<double>{5, 6, 7, 8}), 4.5 / std::sqrt(22.5),
-                1e-12);
+    EXPECT_NEAR(base::rankCorrelation(std::vector<double>{1, 1, 2, 3}, std::vector<double>{5, 6, 7, 8}),
+                4.5 / std::sqrt(22.5), 1e-12);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include <volume/import/barrier.h>
 
-#include <base/quiet_child.h>
+#include <base/process.h>
 #include <volume/import/source.h>
 
 #include <fcntl.h>

@@ -3,10 +3,10 @@
 
 #include <base/inputs.h>
 #include <base/split.h>
+#include <base/utf8.h>
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <sstream>
 
@@ -20,33 +20,23 @@ std::vector<T> parsed(const std::filesystem::path& file, const std::string& what
     std::vector<T> out;
     std::istringstream in(text);
     for (std::string token; in >> token;) {
-        T value{};
-        const char* first = token.data() + (token[0] == '+' ? 1 : 0);
-        const auto [end, error] = std::from_chars(first, token.data() + token.size(), value);
-        const bool whole = error == std::errc() && end == token.data() + token.size();
-        refuseIf(!whole || !std::isfinite(static_cast<double>(value)) || out.size() > 100, file,
+        const auto value = base::numberIn<T>(token);
+        refuseIf(!value || !std::isfinite(static_cast<double>(*value)) || out.size() > 100, file,
                  "{}: '{}' is not a list of numbers: its header is wrong, save it again", what, text.substr(0, 60));
-        out.push_back(value);
+        out.push_back(*value);
     }
     return out;
 }
 
-// Bytes of the UTF-8 character that begins at `at`; 0 where none does. RFC 3629, section 4.
-std::size_t utf8Length(const std::string& text, std::size_t at)
+// Bytes of the UTF-8 character that begins at `at`; 0 where none does.
+std::size_t utf8Length(std::string_view text, std::size_t at)
 {
-    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-    const unsigned lead = byte(at);
-    const std::size_t length = lead < 0x80 ? 1 : lead < 0xc2 ? 0 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : lead < 0xf5 ? 4 : 0;
-    if (length < 2 || at + length > text.size()) {
-        return length == 1 ? 1 : 0;
+    for (std::size_t length = 1; length <= std::min<std::size_t>(4, text.size() - at); ++length) {
+        if (base::isUtf8(text.substr(at, length))) {
+            return length;
+        }
     }
-    const unsigned low = lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
-    const unsigned high = lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
-    bool whole = byte(at + 1) >= low && byte(at + 1) <= high;
-    for (std::size_t i = 2; i < length; ++i) {
-        whole = whole && (byte(at + i) & 0xc0) == 0x80;
-    }
-    return whole ? length : 0;
+    return 0;
 }
 
 }  // namespace

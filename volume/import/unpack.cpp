@@ -11,6 +11,7 @@
 #include <charconv>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -164,17 +165,28 @@ bool isSpace(char c)
     return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == ',' || c == '\f' || c == '\v';
 }
 
+// Part by part what `use(bytes)` makes of it. False where the sink has had enough.
+template <class Use>
+bool readParts(std::ifstream& in, const Sink& sink, Use&& use)
+{
+    std::vector<std::byte> buffer(chunk);
+    while (const std::size_t count = fill(in, buffer)) {
+        if (!sink(use(std::span<const std::byte>(buffer).first(count)))) {
+            return false;
+        }
+    }
+    return true;
+}
+
 void readText(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
 {
     constexpr std::size_t longest = 400;  // no number is longer
-    std::vector<std::byte> buffer(chunk);
     std::vector<double> numbers;
     std::string token;
-    const auto flush = [&] { return sink(std::as_bytes(std::span(numbers))); };
-    while (const std::size_t count = fill(in, buffer)) {
+    const auto take = [&](std::span<const std::byte> bytes) {
         numbers.clear();
-        for (std::size_t i = 0; i < count; ++i) {
-            const char c = static_cast<char>(buffer[i]);
+        for (const std::byte b : bytes) {
+            const char c = static_cast<char>(b);
             if (!isSpace(c) && token.size() < longest) {
                 token += c;
             } else if (!token.empty()) {
@@ -182,15 +194,11 @@ void readText(const std::filesystem::path& file, std::ifstream& in, const Sink& 
                 token.clear();
             }
         }
-        if (!flush()) {
-            return;
-        }
+        return std::as_bytes(std::span(numbers));
+    };
+    if (readParts(in, sink, take)) {
+        sink(take(std::as_bytes(std::span("\n", 1))));  // the last number ends with the file
     }
-    numbers.clear();
-    if (!token.empty()) {
-        numbers.push_back(number(file, token));
-    }
-    flush();
 }
 
 int hexDigit(char c)
@@ -201,13 +209,12 @@ int hexDigit(char c)
 
 void readHex(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
 {
-    std::vector<std::byte> buffer(chunk);
     std::vector<std::byte> bytes;
     int high = -1;
-    while (const std::size_t count = fill(in, buffer)) {
+    readParts(in, sink, [&](std::span<const std::byte> digits) {
         bytes.clear();
-        for (std::size_t i = 0; i < count; ++i) {
-            const char c = static_cast<char>(buffer[i]);
+        for (const std::byte b : digits) {
+            const char c = static_cast<char>(b);
             if (isSpace(c)) {
                 continue;
             }
@@ -223,10 +230,8 @@ void readHex(const std::filesystem::path& file, std::ifstream& in, const Sink& s
                 high = -1;
             }
         }
-        if (!sink(bytes)) {
-            return;
-        }
-    }
+        return std::span<const std::byte>(bytes);
+    });
 }
 
 }  // namespace
@@ -261,13 +266,7 @@ void unpack(const std::filesystem::path& file, std::uint64_t offset, Encoding en
         case Encoding::hex:
             return readHex(file, in, sink);
         case Encoding::raw:
-            break;
-    }
-    std::vector<std::byte> buffer(chunk);
-    while (const std::size_t count = fill(in, buffer)) {
-        if (!sink({buffer.data(), count})) {
-            return;
-        }
+            readParts(in, sink, std::identity());
     }
 }
 

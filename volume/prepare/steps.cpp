@@ -1,6 +1,7 @@
 #include <volume/prepare/steps.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/split.h>
 #include <volume/clean.h>
 #include <volume/resample.h>
@@ -12,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 
 namespace palpate::prepare {
@@ -139,17 +139,11 @@ private:
     // "x0,x1,y0,y1,z0,z1" in mm, patient frame, as voxels whose centres lie inside; nothing when it is no such text.
     std::optional<std::pair<Index3, Index3>> boxFromText() const
     {
-        std::array<double, 6> mm{};
-        const char* at = options_.crop.data();
-        const char* const end = at + options_.crop.size();
-        for (std::size_t i = 0; i < mm.size(); ++i) {
-            const auto number = base::withoutPlus({at, end});
-            const auto [rest, error] = std::from_chars(number.data(), end, mm[i]);
-            if (error != std::errc() || (i < 5 ? rest == end || *rest != ',' : rest != end)) {
-                return std::nullopt;
-            }
-            at = rest + 1;
+        const auto numbers = base::mapped<std::optional<double>>(base::splitAt(',', options_.crop), base::numberIn<>);
+        if (numbers.size() != 6 || !std::ranges::all_of(numbers, [](const auto& number) { return number.has_value(); })) {
+            return std::nullopt;
         }
+        const auto mm = base::mapped<double>(numbers, [](const auto& number) { return *number; });
         const Vec3 low = 1e-3 * Vec3(mm[0], mm[2], mm[4]), high = 1e-3 * Vec3(mm[1], mm[3], mm[5]);
         base::failIf(glm::any(glm::greaterThanEqual(low, high)),
                      "--crop {}: must be x0,x1,y0,y1,z0,z1 in mm, each first one less than its second", options_.crop);

@@ -1,12 +1,18 @@
-#include <datasets/scene_text.h>
-
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/units.h>
+#include <datasets/scene.h>
+#include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 
 namespace palpate::datasets {
 
@@ -149,6 +155,129 @@ ProbePlace probeAfter(const ProbeSpec& probe, const ProbeMove& move) noexcept
     place.direction = c * direction + s * lateral;
     place.lateral = c * lateral - s * direction;
     return place;
+}
+
+namespace {
+
+constexpr int maxSlices = 9;
+constexpr int usualSlices = 3;
+
+constexpr std::array<Field<CtSpec>, 2> ctFields{{
+    {"slice_mm", "mm", 0.5, 20, 1e-3, &CtSpec::width},
+    {"ctdi_mgy", "mGy", 0.1, 100, 1, &CtSpec::doseIndex},
+}};
+
+}  // namespace
+
+void readCt(Section& top, CtSpec& ct)
+{
+    if (std::optional<Section> section = top.section("ct")) {
+        ct.slices = static_cast<int>(section->integer("slices", "", 1, maxSlices).value_or(usualSlices));
+        section->refuseIf(ct.slices % 2 == 0, "slices", "must be odd: the middle one goes through the tip");
+        readFields<CtSpec>(*section, ctFields, ct, Need::some);
+        section->finish();
+    }
+}
+
+std::string ctText(const CtSpec& ct)
+{
+    return ct.given() ? fmt::format("\n[ct]\nslices = {}\n{}", ct.slices, writeFields<CtSpec>(ctFields, ct))
+                      : std::string();
+}
+
+namespace {
+
+constexpr double largest = 5000;  // of a direction's numbers
+
+constexpr std::array<Field<GravitySpec>, 2> gravityFields{{
+    {"g_m_s2", "m/s^2", 0, 30, 1, &GravitySpec::strength},
+    {"modulus", "", 0.001, 100, 1, &GravitySpec::modulus},
+}};
+
+// A posture by its name, or where things fall in it.
+Vec3 readDown(Section& section, std::string_view named, std::string_view directed)
+{
+    std::array<std::string_view, patientPostures.size()> names;
+    std::ranges::transform(patientPostures, names.begin(), &PatientPosture::name);
+    if (section.has(named) && section.has(directed)) {
+        section.refuse(directed, fmt::format("{} says it already", named));
+    }
+    if (const auto index = section.choice(named, names)) {
+        return patientPostures[*index].down;
+    }
+    const auto direction = section.direction(directed, largest);
+    if (!direction) {
+        section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
+    }
+    return *direction;
+}
+
+std::string downText(std::string_view named, std::string_view directed, Vec3 down)
+{
+    for (const PatientPosture& posture : patientPostures) {
+        if (posture.down == down) {
+            return fmt::format("{} = \"{}\"\n", named, posture.name);
+        }
+    }
+    return fmt::format("{} = [{:.12g}, {:.12g}, {:.12g}]\n", directed, down.x, down.y, down.z);
+}
+
+}  // namespace
+
+void readGravity(Section& top, GravitySpec& gravity)
+{
+    if (std::optional<Section> section = top.section("gravity")) {
+        gravity.given = true;
+        gravity.down = readDown(*section, "posture", "direction");
+        gravity.shapeDown = readDown(*section, "shape", "shape_direction");
+        readFields<GravitySpec>(*section, gravityFields, gravity, Need::some);
+        section->finish();
+    }
+}
+
+std::string gravityText(const GravitySpec& gravity)
+{
+    return gravity.given ? fmt::format("\n[gravity]\n{}{}{}", downText("posture", "direction", gravity.down),
+                                       downText("shape", "shape_direction", gravity.shapeDown),
+                                       writeFields<GravitySpec>(gravityFields, gravity))
+                         : std::string();
+}
+
+namespace {
+
+struct Setting {
+    std::string_view name;
+    double spacing;  // [m]
+    int window;
+    int cycles;
+};
+
+constexpr ElasticSettings standard;
+constexpr std::array<Setting, 3> settings{{
+    {"fast", 4e-3, 9, 1},
+    {"default", standard.spacing, standard.window, standard.cycles},
+    {"fine", 1.5e-3, 19, 2},
+}};
+
+}  // namespace
+
+std::vector<std::string> elasticSettings()
+{
+    return base::mapped<std::string>(settings, &Setting::name);
+}
+
+ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& base)
+{
+    for (const Setting& setting : settings) {
+        if (name == setting.name) {
+            ElasticSettings out = base;
+            out.spacing = setting.spacing;
+            out.window = setting.window;
+            out.cycles = setting.cycles;
+            return out;
+        }
+    }
+    throw base::error("setting '{}': there is none; there are {}", name, fmt::join(elasticSettings(), ", "));
 }
 
 }  // namespace palpate::datasets
