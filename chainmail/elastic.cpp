@@ -315,8 +315,10 @@ void Elastic::measure(ElasticResult& result) noexcept
             HeldTool& held = held_[s.owner];
             held.depth = std::max(held.depth, s.depth);
             held.sunk = std::max(held.sunk, s.depth * static_cast<double>(s.resolved));
-            held.load += glm::length(s.force);
+            const double push = glm::length(s.force);
+            held.load += push;
             const Stretch now = stretchAt(s);
+            held.indented += push * now.modulus * static_cast<double>(s.indented);
             s.stretch = now.area;
             s.stiffer = static_cast<float>(now.modulus);
             held.stretch = std::max(held.stretch, s.stretch);

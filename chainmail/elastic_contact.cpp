@@ -43,6 +43,15 @@ double radiusOfPatch(const ElasticTool& tool) noexcept
     return std::sqrt(tool.shape.widest() * glm::length(tool.pushed));
 }
 
+double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept
+{
+    const double byDepth = radiusOfPatch(tool);
+    if (tool.shape.a != tool.shape.b || !(load > 0.0)) {
+        return byDepth;
+    }
+    return std::min(std::cbrt(0.75 * tool.shape.widest() * load * load / indented), 2.0 * byDepth);
+}
+
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept
 {
     return tool.pushed != Vec3(0.0) && radiusOfPatch(tool) < little * spacing;

@@ -102,6 +102,7 @@ struct alignas(64) ContactSite {
     float lacks = 1;          // `more` of resolvedShare()
     float resolved = 1;       // fraction of its stiffness that wider cells leave it
     float stiffer = 1;        // by which its tissue had stiffened at the end of the last call, see StretchAt
+    float indented = 0;       // E / (1 - nu^2) of its tissue at rest, no more than the contact is as stiff as [Pa]
 
     bool active() const noexcept { return isTie || depth > 0.0 || limit > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -156,6 +157,13 @@ double stiffnessUncapped(const ElasticBody& body, double radius) noexcept;
 double stiffestPerArea(const ElasticTool& tool) noexcept;
 /// Of the patch that a tool touches, sqrt(R d) by Hertz [m].
 double radiusOfPatch(const ElasticTool& tool) noexcept;
+/// The same of a ball by its force F, a^3 = 3 F R (1 - nu^2) / 4 E: equal on a half-space, and right as well where
+/// something stiff or soft lies under the tissue, or where that gives way as a whole. What is far from the patch moves all
+/// of it alike, which changes the depth but not how the ball lies in it. At most 2 sqrt(R d), which is that of a thin
+/// incompressible layer on something rigid: what it loses under the ball is what it rises around it.
+/// @param load      sum of the sizes of its contacts' forces [N]; 0: not known
+/// @param indented  sum of these times E / (1 - nu^2) of their tissue [N Pa]
+double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept;
 /// True while that is so small that each surface point is quartered.
 /// @param spacing  of the finest cells [m]
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept;

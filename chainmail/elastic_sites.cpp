@@ -135,16 +135,20 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 }
 
 // Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches less
-// than the cells of a window resolve, by Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves,
-// so that a call keeps one energy.
+// than the cells of a window resolve, by Hertz's radius of what it touches. Tissue that something rigid confines gives way
+// less under the same pressure, by f^(1/3) where it bears f times what a half-space would at this depth, and so may they:
+// that is by how much the patch is wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force
+// on a small patch may be twice too large, and tissue that relaxes, whose force falls while it lies as before, take the
+// patch by the depth. All this is kept while a call solves, so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
     StretchAt stretchAt(stack_, options_.law);
     const ContactSite* before = nullptr;
     double patch = 0.0;  // radius, in cells
-    double most = 0.0;   // stiffness per area
-    Between across;      // where its middle is
+    double confined = 1.0;
+    double most = 0.0;  // stiffness per area
+    Between across;     // where its middle is
     for (ContactSite& s : active()) {
         if (s.isTie) {
             continue;
@@ -152,7 +156,13 @@ void Elastic::spreadPressure() noexcept
         if (before == nullptr || before->owner != s.owner || before->level != s.level) {
             const ElasticTool& tool = tools_[s.owner];
             const auto& grid = body.levels[s.level].nodes;
-            patch = tool.pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tool) / grid.spacing;
+            const HeldTool& held = held_[s.owner];
+            const double byDepth = radiusOfPatch(tool);
+            const bool knowsForce = s.level == 0 && !body.relaxes;
+            const double byForce = knowsForce ? radiusOfPatch(tool, held.load, held.indented) : byDepth;
+            patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
+            const double shallow = std::max(1.0 - glm::length(tool.pushed) / tool.shape.widest(), 0.0);
+            confined = byForce > byDepth ? std::pow(byForce / byDepth, shallow) : 1.0;
             across = betweenNodes(grid, tool);
             most = stiffestPerArea(tool);
             before = &s;
@@ -163,7 +173,9 @@ void Elastic::spreadPressure() noexcept
                                                           : stretchAt(s);
         const double share = resolvedShare(patch, across, static_cast<double>(s.lacks));
         s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
-        s.stiffness = share * now.area * std::min(now.modulus * s.atRest, stiffened * most * static_cast<double>(s.area));
+        const double bound = most * static_cast<double>(s.area);
+        const double atRest = std::max(s.atRest, std::min(confined * s.atRest, bound));
+        s.stiffness = share * now.area * std::min(now.modulus * atRest, stiffened * bound);
     }
 }
 

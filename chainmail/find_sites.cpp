@@ -31,13 +31,15 @@ double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& t
 }
 
 // How much more compliance than the finest cells of soft tissue those around a site lack, over its own. What is as stiff as
-// may be gives way less than that in cells of any size.
-double lacksOver(const ElasticBody& body, const ContactSite& site, const SurfacePoint& p) noexcept
+// may be gives way less than that in cells of any size, nor does it lie around a tool as its modulus says: radiusOfPatch().
+void findLacking(const ElasticBody& body, const SurfacePoint& p, ContactSite& site) noexcept
 {
     const CellLevel& finest = body.levels.front();
     const double uncapped = penalty * youngsModulusOf(p.mu) / finest.nodes.spacing * static_cast<double>(site.area);
-    const double gives = 1.0 + compressible * std::max(0.0, softPoisson - poissonAt(finest, site.anchor));
-    return 1.0 + (std::ldexp(gives, site.level) - 1.0) * site.atRest / uncapped;
+    const double kept = site.atRest / uncapped, nu = poissonAt(finest, site.anchor);
+    const double gives = 1.0 + compressible * std::max(0.0, softPoisson - nu);
+    site.lacks = static_cast<float>(1.0 + (std::ldexp(gives, site.level) - 1.0) * kept);
+    site.indented = static_cast<float>(2.0 * static_cast<double>(p.mu) / (1.0 - nu) * kept);
 }
 
 // A unit vector across a unit vector.
@@ -216,8 +218,7 @@ private:
         if (!meetsTissue(site) || !isNear(shape, site, near_)) {
             return false;
         }
-        const SurfacePoint& point = body_.points[site.point];
-        site.lacks = static_cast<float>(lacksOver(body_, site, point));
+        findLacking(body_, body_.points[site.point], site);
         ++count_;
         return true;
     }

@@ -25,6 +25,7 @@ struct HeldTool {
     double depth = 0;     // to which the surface sank into it in the last call [m]
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
+    double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
@@ -35,7 +36,7 @@ struct HeldTool {
     /// Nothing is known yet of this call's contacts.
     void forgetContacts() noexcept
     {
-        depth = sunk = load = stretch = 0.0;
+        depth = sunk = load = indented = stretch = 0.0;
         lag = Vec3(0.0);
     }
     /// The tool for this call, as deep as the last one lets it go.

@@ -339,7 +339,7 @@ TEST(ElasticDeep, ABallOverBoneStopsAtItWhereverItLiesInItsCells)
         EXPECT_GT(in.back(), 4e3 * inBone - 2.0) << h;
         EXPECT_LT(in.back(), 4e3 * inBone + 4.0) << h;
         for (std::size_t i = 0; i < out.size(); ++i) {
-            EXPECT_NEAR(out[i], in[in.size() - 2 - i], 0.05 * in[in.size() - 2 - i] + 0.01) << h;
+            EXPECT_NEAR(out[i], in[in.size() - 2 - i], 0.05 * in[in.size() - 2 - i] + 0.015) << h;
         }
     }
 }
@@ -391,8 +391,8 @@ TEST(ElasticDeep, FirstTouchFollowsHertzWhereverTheSurfaceLiesInItsCells)
     for (const double full : {1.0, 0.8, 0.5, 0.2}) {
         const ElasticBody body = blockCutAt(full, nu);
         for (const Touch touch :
-             {Touch{0.5, 0.03, 0.072}, Touch{0.6, 0.025, 0.05}, Touch{0.75, 0.02, 0.033}, Touch{1.0, 0.02, 0.022},
-              Touch{1.25, 0.02, 0.02}, Touch{1.5, 0.02, 0.026}, Touch{2.0, 0.02, 0.024}}) {
+             {Touch{0.5, 0.03, 0.072}, Touch{0.6, 0.025, 0.05}, Touch{0.75, 0.025, 0.033}, Touch{1.0, 0.02, 0.024},
+              Touch{1.25, 0.02, 0.028}, Touch{1.5, 0.02, 0.026}, Touch{2.0, 0.02, 0.024}}) {
             const double a = touch.cells * 2e-3;
             const double d = a * a / r;
             const double chi = a / (38e-3 + 2e-3 * full + (full < 1.0 ? 2e-3 : 0.0));
