@@ -14,13 +14,14 @@
 
 namespace palpate::chainmail {
 
-inline constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
+inline constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
+inline constexpr double stiffened = 10.0;  // of ElasticTool::stiffest: the bound where tissue gives way
 
 /// A rigid tool that tissue cannot enter.
 struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]
     Vec3 pushed{0.0};  // its way there from where it would lie on the surface at rest; 0: nothing is known of its depth [m]
-    double stiffest = 1e4;  // of the whole contact [N/m], bone is no stiffer: the force on a hand is held by the stabiliser
+    double stiffest = 1e4;  // of the whole contact with bone [N/m]; with tissue that gives way `stiffened` times as much
     double friction = 0;    // Coulomb [-]
 };
 

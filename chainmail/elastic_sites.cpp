@@ -16,7 +16,6 @@ constexpr double reach = 0.6;         // spacings from a tool within which surfa
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr int stillPeriod = 64;       // calls after which they are beside ties, which drag tissue to a tool that rests
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
-constexpr double stiffened = 10.0;    // a contact whose tissue stiffens: times ElasticTool::stiffest
 
 // How many sites ties take, at most.
 std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept

@@ -25,9 +25,13 @@ double touchedAtFirst(double radius) noexcept
 }
 
 // Stiffness of a surface point by its area at rest.
-double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
+double siteStiffness(const ElasticBody& body, const SurfacePoint& p, const ElasticTool& tool) noexcept
 {
-    return std::min(penalty * youngsModulusOf(p.mu) / spacing, stiffestPerArea(tool)) * static_cast<double>(p.area);
+    const auto& grid = body.levels.front().nodes;
+    const Index3 cell(glm::floor((Vec3(p.anchor) - grid.origin) / grid.spacing));
+    const bool givesWay = grid.contains(cell) && body.held[grid.offset(cell)] == 0.0F;
+    const double most = stiffestPerArea(tool) * (givesWay ? stiffened : 1.0);
+    return std::min(penalty * youngsModulusOf(p.mu) / grid.spacing, most) * static_cast<double>(p.area);
 }
 
 // How much more compliance than the finest cells of soft tissue those around a site lack, over its own. What is as stiff as
@@ -176,7 +180,7 @@ private:
             site.anchor = Vec3(point.anchor);
             site.owner = static_cast<std::uint16_t>(index);
             site.point = i;
-            site.atRest = site.stiffness = siteStiffness(point, spacing, tool);
+            site.atRest = site.stiffness = siteStiffness(body_, point, tool);
             site.area = point.area;
             const bool added = addIfNear(shape, site);
             if (added && touchesLittle(tool, spacing) && static_cast<double>(point.area) > coarse * spacing * spacing) {
