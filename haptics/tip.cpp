@@ -48,7 +48,7 @@ struct Tip {
         state.phase = Phase::contact;
         const Vec3 front = occupancy::restPoint(body, way.point) + (way.front - way.point);
         take(touching(model.surface, proxyTool(), front));
-        const auto touched = reader.tissue(state.place - (offset() + 0.5e-3) * state.normal);
+        const auto touched = tissueTouched(state.place - offset() * state.normal);
         addEvent(record, {EventKind::contact, 0xFF, touched, glm::distance(way.front, device.position)});
     }
 
@@ -56,6 +56,21 @@ struct Tip {
     ProxyTool proxyTool() const noexcept
     {
         return {offset(), model.scene.tool.pressedLength(), device.axis, needle() ? tipFriction : 0.0};
+    }
+
+    // Under a point of the surface. The first voxel with tissue may begin up to a voxel deeper: the air before it would be
+    // pierced without a force, and the skin behind it would never be.
+    std::uint8_t tissueTouched(Vec3 surface) const noexcept
+    {
+        constexpr double under = 0.5e-3;  // [m]
+        constexpr int steps = 4;
+        const Vec3 voxel = model.tissue->affine().spacing();
+        const double deeper = std::max({voxel.x, voxel.y, voxel.z}) / steps;
+        auto touched = reader.tissue(surface - under * state.normal);
+        for (int i = 1; i <= steps && touched == 0; ++i) {
+            touched = reader.tissue(surface - (under + i * deeper) * state.normal);
+        }
+        return touched;
     }
 
     void take(const SurfaceProxy& proxy) noexcept
@@ -81,7 +96,7 @@ struct Tip {
         const double law = needle() ? needleLaw(model, local).force(way) : sphereForce(model, local, way);
         const double force = std::max(law - state.lost.lost(), 0.0);
         const Vec3 push = -force / way * away;
-        state.tissue = reader.tissue(under - 0.5e-3 * state.normal);
+        state.tissue = tissueTouched(under);
         state.lost.hold(law, relaxationOf(model, state.tissue), dt);
         const double along = -glm::dot(push, device.axis);
         if (!needle() || along <= 0.0 || glm::dot(device.axis, state.normal) > -0.2) {

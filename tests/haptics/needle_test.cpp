@@ -7,7 +7,9 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -67,6 +69,32 @@ TEST(Needle, ForceAgainstDepthShowsEveryBoundary)
         names.push_back(peak.tissue);
     }
     EXPECT_EQ(names, (std::vector<std::string>{"skin", "fat", "gland", "idc_high_grade", "gland", "muscle"}));
+}
+
+// The surface of a body is smooth, its voxels are not: wherever the needle touches skin that lies turned in the grid, it
+// has to pierce the skin, and no voxel of air under the surface.
+TEST(Needle, TurnedSkinIsPiercedEverywhere)
+{
+    const auto model = tests::boxOf(
+        [](Vec3 p) {
+            const double depth = p.y - 12e-3 - 0.4 * p.x - 0.3 * p.z;
+            return std::string(p.x > 20e-3 && p.y > 50e-3 ? "bone" : depth < 0 ? "air" : depth < 2e-3 ? "skin" : "fat");
+        },
+        "bone", tests::chainmailOnly);
+    const auto skin = *model.tissue->table().find("skin");
+    for (int i = 0; i < 100; ++i) {
+        const double x = 1e-3 * (0.17 * i - 8.5), z = 1e-3 * (7.0 - 0.13 * i);
+        LoneNeedle needle(model);
+        std::vector<Event> pierced;
+        needle.go({x, -5e-3, z}, {x, 25e-3, z}, 0.05, [&](Vec3, Vec3) {
+            const auto* const events = needle.record.events.data();
+            std::copy_if(events, events + needle.record.eventCount, std::back_inserter(pierced),
+                         [](const Event& e) { return e.kind == EventKind::puncture; });
+        });
+        ASSERT_FALSE(pierced.empty()) << x << ' ' << z;
+        EXPECT_EQ(pierced[0].tissue, skin) << x << ' ' << z;
+        EXPECT_GE(pierced[0].value, model.tissue->table().rows[skin].punctureForce) << x << ' ' << z;
+    }
 }
 
 // Two slabs of fat of 10 mm with 20 mm of air between: beyond the first only friction holds, over what is in it, and the
