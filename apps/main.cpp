@@ -114,7 +114,7 @@ int main(int argc, char** argv)
 #endif
 
     command::refuseNoValues(app);
-    command::endOnSignals();
+    command::endOnSignals("palpate");
     command::failOnLargeFiles();
     return exitStatus(app, [&] {
         app.parse(commandOf(argc, argv));

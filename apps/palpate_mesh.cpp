@@ -112,13 +112,16 @@ void run(const MeshArguments& o)
     base::failIf(o.volume.empty(), "no volume: name one (.vdb), or a built-in phantom: {}",
                  fmt::join(datasets::builtInScenes(), ", "));
     base::failIf(o.output.empty(), "nothing to write: name a file with -o, which ends in {}", reference::meshFileEndings());
+    base::failIf(o.largest > 0.0 && o.largest < o.size,
+                 "--largest {:g}: must be at least the {:g} mm of --size, which is the edge length on surfaces", o.largest,
+                 o.size);
     reference::checkMeshFile(o.output);
     base::checkOutputs({o.output, o.json}, {o.volume});
     const volume::Tissue tissue = openVolume(o.volume);
     command::Progress progress(command::Progress::Clock::ticking);
     reference::VolumeMeshOptions options;
     options.size = 1e-3 * o.size;
-    options.largest = 1e-3 * std::max(o.size, o.largest > 0.0 ? o.largest : 2.5 * o.size);
+    options.largest = 1e-3 * (o.largest > 0.0 ? o.largest : 2.5 * o.size);
     options.surface = o.surface == "nets" ? reference::SurfaceKind::nets : reference::SurfaceKind::cgal;
     options.progress = [&](const std::string& what) { progress.show(what); };
     const reference::VolumeMesh made = reference::meshVolume(tissue, options);
@@ -167,7 +170,7 @@ int main(int argc, char** argv)
     if (argc == 4 && std::string_view(argv[1]) == "--tetgen-job") {
         return palpate::reference::runTetGenJob(argv[2], argv[3]);
     }
-    palpate::command::endOnSignals();
+    palpate::command::endOnSignals("palpate-mesh");
     palpate::apps::MeshArguments options;
     return palpate::apps::runParsed(
         argc, argv, "palpate-mesh", "Meshes a volume with conforming tetrahedra, one region per tissue",

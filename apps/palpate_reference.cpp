@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <command/interrupted.h>
 #include <command/json.h>
 #include <reference/ccx.h>
 #include <reference/mesh_files.h>
@@ -275,6 +276,7 @@ void verify(const ReferenceArguments& o)
 void run(const ReferenceArguments& o)
 {
     if (o.verify) {
+        base::failIf(!o.scene.empty(), "--verify: solves problems of its own: leave it or the scene out");
         verify(o);
         return;
     }
@@ -282,6 +284,8 @@ void run(const ReferenceArguments& o)
     base::checkOutputs({o.vtu, o.json, o.save, o.ccx}, {o.scene, o.pathOf});
     base::failIf(o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty(),
                  "nothing to write: name a file with --output, --json, --save or --export-ccx");
+    base::failIf(!o.vtu.empty() && std::filesystem::path(o.vtu).extension() != ".vtu",
+                 "{}: --output is written as .vtu, for ParaView: name it so (CalculiX: --export-ccx)", o.vtu);
     base::failIf(!o.save.empty() && o.mesher != "cgal",
                  "--save: `palpate accuracy` needs references on CGAL's mesh: leave out --mesher");
     base::failIf(
@@ -317,9 +321,7 @@ void run(const ReferenceArguments& o)
     info.elements = o.elements;
     info.speed = 1e-3 * o.speed;
     info.program = std::string(base::build());
-    for (const auto& [file, text] : results.files) {
-        base::writeWhole(file, text);
-    }
+    // The large ones last: where the disk is full by then, what the run was for is there.
     if (!o.save.empty()) {
         studies::saveReference(o.save, results.reference, info);
     }
@@ -337,13 +339,16 @@ void run(const ReferenceArguments& o)
                         {"looks", results.looks}});
         command::writeJson(o.json, figures);
     }
+    for (const auto& [file, text] : results.files) {
+        base::writeWhole(file, text);
+    }
 }
 
 void addOptions(CLI::App& app, ReferenceArguments& o)
 {
     app.add_option("scene", o.scene, "Scene: a built-in name, a file (.toml), or a volume (.vdb)");
     app.add_option("-o,--output", o.vtu, "Write the last state for ParaView (.vtu)");
-    app.add_flag("--all", o.all, "With -o: write a numbered .vtu for every look");
+    app.add_flag("--all", o.all, "With -o: write a numbered .vtu for every look")->needs("--output");
     app.add_option("--tool", o.tool, "Sphere that presses: sphere_5mm or sphere_10mm")->capture_default_str();
     app.add_option("--law", o.law, "Material law: linear (small strain), or a law of finite strain, as in scenes")
         ->check(CLI::IsMember(std::vector<std::string>(volume::lawNames.begin(), volume::lawNames.end())))
@@ -392,6 +397,7 @@ void addOptions(CLI::App& app, ReferenceArguments& o)
 
 int main(int argc, char** argv)
 {
+    palpate::command::endOnSignals("palpate-reference");
     palpate::apps::ReferenceArguments options;
     return palpate::apps::runParsed(
         argc, argv, "palpate-reference", "Meshes a scene, solves it with finite elements, and writes both",

@@ -4,30 +4,36 @@
 
 #include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
+#include <string_view>
 
 namespace palpate::command {
 
 namespace {
 
 pid_t program = 0;
+std::array<char, 64> lastWords{};  // made before there is a signal
 
 // Only what a handler of signals may call. A forked child, which Ctrl-C reaches as well, ends without a word.
 void onSignal(int signal)
 {
     if (::getpid() == program) {
-        constexpr const char* line = "\r\033[Kpalpate: interrupted\n";
-        const char* text = ::isatty(STDERR_FILENO) != 0 ? line : std::strchr(line, 'p');
-        [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text, std::strlen(text));
+        constexpr std::string_view startOfLine = "\r\033[K";
+        if (::isatty(STDERR_FILENO) != 0) {
+            [[maybe_unused]] const auto cleared = ::write(STDERR_FILENO, startOfLine.data(), startOfLine.size());
+        }
+        [[maybe_unused]] const auto written = ::write(STDERR_FILENO, lastWords.data(), std::strlen(lastWords.data()));
     }
     ::_exit(128 + signal);
 }
 
 }  // namespace
 
-void endOnSignals()
+void endOnSignals(std::string_view name)
 {
     program = ::getpid();
+    std::snprintf(lastWords.data(), lastWords.size(), "%.*s: interrupted\n", static_cast<int>(name.size()), name.data());
     struct sigaction action {};
     action.sa_handler = onSignal;
     for (const int signal : std::array{SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {

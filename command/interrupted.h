@@ -2,13 +2,14 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace palpate::command {
 
-/// From now on Ctrl-C, a polite kill and a terminal that is closed (SIGINT, SIGTERM, SIGHUP, SIGQUIT) end this program with
-/// one line that says so and the exit status 128 + signal. For commands that have nothing to end in order; others install
-/// handlers of their own meanwhile. A signal that is ignored stays ignored (nohup).
-void endOnSignals();
+/// From now on Ctrl-C, a polite kill and a terminal that is closed (SIGINT, SIGTERM, SIGHUP, SIGQUIT) end this program,
+/// `name`, with one line that says so and the exit status 128 + signal. For commands that have nothing to end in order;
+/// others install handlers of their own meanwhile. A signal that is ignored stays ignored (nohup).
+void endOnSignals(std::string_view name);
 
 /// From now on a file that grows over the user's limit (ulimit -f) is an error of its writer, as a full disk is; the system
 /// would end the program without a word.

@@ -10,10 +10,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <thread>
 
 namespace palpate::apps {
 
@@ -98,6 +100,22 @@ bool Program::running()
         pid_ = -1;
     }
     return pid_ > 0;
+}
+
+bool catches(Program& program, int signal)
+{
+    using namespace std::chrono_literals;
+    const std::string status = "/proc/" + std::to_string(program.pid()) + "/status", key = "SigCgt:";
+    for (int i = 0; i < 1000 && program.running(); ++i) {
+        const std::string text = readText(status);
+        const auto at = text.find(key);
+        const auto caught = at == std::string::npos ? 0 : std::stoull(text.substr(at + key.size()), nullptr, 16);
+        if ((caught >> (signal - 1) & 1) != 0) {
+            return true;
+        }
+        std::this_thread::sleep_for(20ms);
+    }
+    return false;
 }
 
 bool built(const std::string& name)

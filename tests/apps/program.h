@@ -39,6 +39,9 @@ private:
     int status_ = 0;
 };
 
+/// Waits until a program that has just been started handles a signal; false: it does not, or has ended.
+bool catches(Program& program, int signal);
+
 /// Whether the program was built.
 bool built(const std::string& name);
 

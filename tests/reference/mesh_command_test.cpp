@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 
 namespace palpate::apps {
@@ -89,6 +90,7 @@ TEST(MeshCommand, BadInputIsOneLine)
     expectMeshRefusal({scene, "-o", folder / "no/such/folder/m.vtu"}, "no/such/folder");
     expectMeshRefusal({scene, "-o", out, "--size", "0"}, "--size");
     expectMeshRefusal({scene, "-o", out, "--size", "many"}, "--size");
+    expectMeshRefusal({scene, "-o", out, "--size", "5", "--largest", "4"}, "--largest 4: must be at least the 5 mm");
     expectMeshRefusal({scene, "-o", out, "--surface", "none"}, "--surface");
     writeText(folder / "not.vdb", "this is no volume");
     expectMeshRefusal({folder / "not.vdb", "-o", out}, "not.vdb");
@@ -96,6 +98,18 @@ TEST(MeshCommand, BadInputIsOneLine)
     EXPECT_FALSE(std::filesystem::exists(out));
     // What TetGen's process is asked for is read as carefully.
     EXPECT_NE(mesh({"--tetgen-job", folder / "not.vdb", folder / "result"}).status, 0);
+}
+
+TEST(MeshCommand, EndsOnASignalWithOneLineInItsName)
+{
+    const Folder folder;
+    Program program("palpate-mesh", {"breast", "--size", "2", "-o", folder / "m.vtu"});
+    ASSERT_TRUE(catches(program, SIGINT));
+    program.send(SIGINT);
+    const Outcome o = program.wait();
+    EXPECT_EQ(o.status, 128 + SIGINT);
+    EXPECT_EQ(o.err, "palpate-mesh: interrupted\n");
+    EXPECT_FALSE(std::filesystem::exists(folder / "m.vtu"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 
 namespace palpate::apps {
@@ -86,6 +87,51 @@ TEST(ReferenceCommand, RefusesPathsThatAreNone)
     refused(pressBeside(folder, "sphere_5mm", true), "its tool is sphere_5mm, not sphere_10mm");
     refused(folder / "small.toml", "is no reference that can be used");
     refused(folder / "none.ref", "none.ref");
+}
+
+TEST(ReferenceCommand, RefusesWhatItWouldNotDo)
+{
+    const Folder folder;
+    writeText(folder / "small.toml", sceneText);
+    const auto refused = [&](std::vector<std::string> arguments, const std::string& hint) {
+        const Outcome o = Program("palpate-reference", arguments).wait();
+        EXPECT_GT(o.status, 0) << hint;
+        EXPECT_EQ(std::ranges::count(o.err, '\n'), 1) << o.err;
+        EXPECT_NE(o.err.find(hint), std::string::npos) << o.err;
+    };
+    const std::string scene = folder / "small.toml";
+    refused({scene, "--looks", "1", "-o", folder / "small.inp"}, "written as .vtu");
+    refused({scene, "--looks", "1", "--all", "--json", folder / "r.json"}, "--all requires");
+    refused({scene, "--verify"}, "leave it or the scene out");
+    refused({scene, "--press", "nan", "--json", folder / "r.json"}, "must be a number");
+}
+
+// Half an hour's work is not lost for want of room for the pictures of it.
+TEST(ReferenceCommand, FiguresAreWrittenBeforeTheStateThatMayNotFit)
+{
+    const Folder folder;
+    writeText(folder / "small.toml", sceneText);
+    // A limit of 64 kB a file is a disk that is full for the state alone.
+    const Outcome o = Program("/bin/bash", {"-c",
+                                            "ulimit -f 64; exec " PALPATE_BIN_DIR "/palpate-reference \"$0\" --looks 1 "
+                                            "--size 8 -o \"$1.vtu\" --json \"$1.json\"",
+                                            folder / "small.toml", folder / "r"})
+                          .wait();
+    EXPECT_EQ(o.status, 1);
+    EXPECT_NE(o.err.find("r.vtu: cannot be written"), std::string::npos) << o.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / "r.vtu"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "r.json"));
+}
+
+TEST(ReferenceCommand, EndsOnASignalWithOneLine)
+{
+    const Folder folder;
+    Program program("palpate-reference", {"block", "--looks", "1", "--size", "1", "--json", folder / "r.json"});
+    ASSERT_TRUE(catches(program, SIGTERM));
+    program.send(SIGTERM);
+    const Outcome o = program.wait();
+    EXPECT_EQ(o.status, 128 + SIGTERM);
+    EXPECT_EQ(o.err, "palpate-reference: interrupted\n");
 }
 
 }  // namespace
