@@ -99,6 +99,13 @@ std::size_t draw(LabelImage& image, const Shape& shape, const std::vector<char>&
     return count;
 }
 
+// Whether the voxel around a point holds tissue.
+bool amidTissue(const LabelImage& image, Vec3 p, const std::vector<char>& inside)
+{
+    const Index3 n(glm::round(image.affine.toIndex(p)));
+    return n == glm::clamp(n, Index3(0), image.size - 1) && inside[image.values[image.offset(n)]] != 0;
+}
+
 bool roomFor(const Tissue& tissue, const Tissue::Reader& reader, const Insert& lesion)
 {
     const double radius = Shape(lesion).bound();
@@ -165,6 +172,11 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
         const std::uint16_t label = freeLabel(used, insert.name);
         if (draw(image, Shape(insert), inside, label) == 0) {
             const Vec3 c = insert.centre * 1e3;
+            base::failIf(
+                amidTissue(image, insert.centre, inside),
+                "insert '{}' at [{:g}, {:g}, {:g}] mm: with {:g} mm it holds the middle of no voxel: make it larger, or "
+                "the voxels smaller",
+                insert.name, c.x, c.y, c.z, 1e3 * insert.diameter);
             throw base::error("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume", insert.name, c.x,
                               c.y, c.z);
         }

@@ -103,6 +103,16 @@ TEST(Insert, RefusesWhatCannotBe)
     EXPECT_NE(tests::errorOf([&] { withInserts(tissue, {&insert, 1}); }).find("cheese"), std::string::npos);
     insert = ball({0, -80e-3, 0}, 8e-3);
     EXPECT_NE(tests::errorOf([&] { withInserts(tissue, {&insert, 1}); }).find("no tissue"), std::string::npos);
+    const Insert small = ball({0.5e-3, 20.5e-3, 0.5e-3}, 0.2e-3);  // between the middles of voxels or about one
+    const Insert beside = ball({0.25e-3, 20.25e-3, 0.25e-3}, 0.2e-3);
+    const std::string fault = tests::errorOf([&] {
+                                  withInserts(tissue, {&small, 1});
+                              }) +
+                              tests::errorOf([&] {
+                                  withInserts(tissue, {&beside, 1});
+                              });
+    EXPECT_NE(fault.find("with 0.2 mm it holds the middle of no voxel: make it larger"), std::string::npos) << fault;
+    EXPECT_EQ(fault.find("no tissue"), std::string::npos) << fault;
     insert = ball({0, 20e-3, 0}, 8e-3);
     insert.name = "fat";
     EXPECT_NE(tests::errorOf([&] { withInserts(tissue, {&insert, 1}); }).find("another name"), std::string::npos);
