@@ -170,10 +170,13 @@ std::string page(std::string_view title, std::string_view body, const nlohmann::
         "content=\"width=device-width, initial-scale=1\"><title>" +
         escape(title) + "</title>\n<style>";
     out.append(asset("assets/uPlot.min.css")).append(asset("assets/report.css"));
-    out.append("</style></head>\n<body><main>").append(body);
+    // Without scripts the reader learns at the top that charts are missing, and not behind a dozen empty cards.
+    out.append(
+        "</style><noscript><style>.chart { display: none; }</style></noscript></head>\n<body><main><noscript><p "
+        "class=\"warning\">The charts need JavaScript; everything else is here without it.</p></noscript>");
+    out.append(body);
     out +=
         "<footer>Written by Palpate. Charts by uPlot (MIT licence).</footer></main>\n"
-        "<noscript><p>The charts need JavaScript; everything else is here without it.</p></noscript>\n"
         "<script type=\"application/json\" id=\"data\">" +
         embedded(data) + "</script>";
     for (const auto* script : {"assets/uPlot.iife.min.js", "assets/scatter.js", "assets/report.js"}) {

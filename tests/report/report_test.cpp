@@ -368,6 +368,13 @@ kind = "needle"
     EXPECT_EQ(textOf(folder / "touch.html").find("The gun was not fired"), std::string::npos);
 }
 
+TEST(Report, WithoutScriptsTheReaderLearnsFirstThatChartsAreMissing)
+{
+    const std::string text = page("t", "<h1>body</h1>", nlohmann::json::object());
+    EXPECT_LT(text.find("<noscript><p class=\"warning\">The charts need JavaScript"), text.find("<h1>body</h1>"));
+    EXPECT_NE(text.find("<noscript><style>.chart { display: none; }"), std::string::npos);
+}
+
 TEST(Report, RefusesAFolderThatIsNotThereOnOneLine)
 {
     const synthetic::Folder folder;
