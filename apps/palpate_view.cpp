@@ -2,12 +2,14 @@
 #include <apps/replay_player.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/quantities.h>
 #include <base/words.h>
 #include <command/interrupted.h>
 #include <command/json.h>
 #include <render/keys.h>
 #include <render/viewer.h>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include <nlohmann/json.hpp>
@@ -71,6 +73,15 @@ struct Words {
     double at = -1;  // [s]; negative: from the beginning
 };
 
+// A time as `palpate export --at` takes it, 3.2s or 3200ms, as the seconds that it is.
+std::string inSeconds(std::string& time)
+{
+    if (const auto seconds = palpate::base::timeOf(time)) {
+        time = fmt::format("{}", *seconds);
+    }
+    return {};
+}
+
 void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
     app.add_flag_callback(
@@ -81,7 +92,9 @@ void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& w
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
     app.add_option("--replay", words.replay, "Show a record (train --record) instead of a running session")
         ->excludes("--session");
-    app.add_option("--at", words.at, "With --replay: start at this session time; a window stands still there [s]")
+    app.add_option("--at", words.at,
+                   "With --replay: start at this session time (3.2, 3.2s or 3200ms), where a window stands still")
+        ->transform(CLI::Validator(inSeconds, ""))
         ->check(CLI::Range(0.0, 86400.0));
     app.add_option("--ghost", words.ghost,
                    "With --replay: also show the tool of this record in the same body, e.g. an expert's");
@@ -119,8 +132,10 @@ void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Word
                    "Write the time at which each tick was shown to this file (CSV, CLOCK_MONOTONIC)");
     app.add_option("--size", words.size, "Size of the picture, WIDTHxHEIGHT [pixels]")->capture_default_str();
     app.add_option("--every", options.every, "With --offscreen: session time between two pictures [s]")
+        ->check(CLI::Range(0.0, 86400.0))
         ->capture_default_str();
     app.add_option("--wait", options.wait, "Time to wait for a session, and to stay open after its end [s]")
+        ->check(CLI::Range(0.0, 86400.0))
         ->capture_default_str();
     app.add_option("--frames", options.frames, "End after this many pictures (0: no limit)")->capture_default_str();
     app.add_option("--json", words.json, "Write frame times to this file (- = standard output)");

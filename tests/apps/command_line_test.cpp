@@ -135,6 +135,26 @@ TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
     EXPECT_EQ(viewer.err.find("palpate-view: --json: the value is empty"), 0U) << viewer.err;
 }
 
+// As `palpate export --at` takes them; a number alone is in seconds.
+TEST(CommandLine, TheViewerTakesTimesWithTheirUnits)
+{
+    const Folder folder;
+    const std::string none = folder / "none.db";
+    const auto ended = [&](const std::string& at) {
+        return Program("palpate-view", {"--replay", none, "--at", at}).wait().err;
+    };
+    for (const std::string at : {"3", "3s", "3200ms", "0s", "86400"}) {
+        EXPECT_EQ(ended(at).find("palpate-view: " + none), 0U) << ended(at);
+    }
+    for (const std::string option : {"--every", "--wait"}) {
+        const auto said = Program("palpate-view", {"--replay", none, option, "nan"}).wait().err;
+        EXPECT_EQ(said, "palpate-view: " + option + ": nan: must be a number (see palpate-view --help)\n");
+    }
+    for (const std::string at : {"3m", "s", "-1s", "nan", "nans", "90000s"}) {
+        EXPECT_EQ(ended(at).find("palpate-view: --at: "), 0U) << ended(at);
+    }
+}
+
 // A name that was typed twice replaced the path, the segmentation, the volume, the record or all profiles by the output.
 TEST(CommandLine, AFileThatIsReadIsNotReplacedByWhatIsWritten)
 {
