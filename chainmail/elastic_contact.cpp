@@ -46,10 +46,11 @@ double radiusOfPatch(const ElasticTool& tool) noexcept
 double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept
 {
     const double byDepth = radiusOfPatch(tool);
-    if (tool.shape.a != tool.shape.b || !(load > 0.0)) {
+    if (tool.shape.a != tool.shape.b || !(indented > 0.0)) {
         return byDepth;
     }
-    return std::min(std::cbrt(0.75 * tool.shape.widest() * load * load / indented), 2.0 * byDepth);
+    const double deep = std::pow(glm::length(tool.pushed), 1.5);
+    return std::min(std::cbrt(0.75 * tool.shape.widest() * load * load / indented * deep), 2.0 * byDepth);
 }
 
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept

@@ -162,8 +162,8 @@ double radiusOfPatch(const ElasticTool& tool) noexcept;
 /// something stiff or soft lies under the tissue, or where that gives way as a whole. What is far from the patch moves all
 /// of it alike, which changes the depth but not how the ball lies in it. At most 2 sqrt(R d), which is that of a thin
 /// incompressible layer on something rigid: what it loses under the ball is what it rises around it.
-/// @param load      sum of the sizes of its contacts' forces [N]; 0: not known
-/// @param indented  sum of these times E / (1 - nu^2) of their tissue [N Pa]
+/// @param load      sum of the sizes of its contacts' forces [N]
+/// @param indented  sum of these times d^1.5 E / (1 - nu^2), d the depth that is theirs [N Pa m^1.5]; 0: not known
 double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept;
 /// True while that is so small that each surface point is quartered.
 /// @param spacing  of the finest cells [m]
