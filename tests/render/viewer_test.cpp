@@ -381,10 +381,10 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 
 TEST_F(Viewer, TellsInOneLineWhatIsMissing)
 {
-    const auto expectError = [&](const std::vector<std::string>& command, const std::string& words,
-                                 bool emptyPath = false) {
+    const auto expectError = [&](const std::vector<std::string>& command, const std::string& words, bool emptyPath = false,
+                                 int status = 1) {
         Process viewer(command, log("viewer"), emptyPath);
-        EXPECT_EQ(viewer.wait(), 1) << words;
+        EXPECT_EQ(viewer.wait(), status) << words;
         const std::string text = said("viewer");
         EXPECT_EQ(text.rfind("palpate-view: ", 0), 0U) << text;
         EXPECT_NE(text.find(words), std::string::npos) << text;
@@ -394,7 +394,7 @@ TEST_F(Viewer, TellsInOneLineWhatIsMissing)
     expectError({program(), "--session", "a/b", "--offscreen", pictures()}, "a name is");
     expectError({program(), "--session", session_}, "no display");
     expectError(view({"--wait", "0.3"}), "install the package xvfb", true);
-    expectError(view({"--every", "-1"}), "0 s or more");
+    expectError(view({"--every", "-1"}), "--every: Value -1 not in range", false, 2);
     expectError({program(), "--size", "12"}, "WIDTHxHEIGHT");
     EXPECT_FALSE(fs::exists(pictures())) << "a folder without a picture is left";
     fs::remove_all(pictures());
