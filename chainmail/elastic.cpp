@@ -324,9 +324,6 @@ void Elastic::measure(ElasticResult& result) noexcept
             held.stretch = std::max(held.stretch, s.stretch);
         }
     }
-    for (HeldTool& held : held_) {
-        held.indented *= std::pow(held.given, 1.5);
-    }
 }
 
 // Sum of the contacts' forces, each by its size [N].

@@ -46,11 +46,20 @@ double radiusOfPatch(const ElasticTool& tool) noexcept
 double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept
 {
     const double byDepth = radiusOfPatch(tool);
-    if (tool.shape.a != tool.shape.b || !(indented > 0.0)) {
+    if (!(load > 0.0) || !(byDepth > 0.0)) {
         return byDepth;
     }
-    const double deep = std::pow(glm::length(tool.pushed), 1.5);
-    return std::min(std::cbrt(0.75 * tool.shape.widest() * load * load / indented * deep), 2.0 * byDepth);
+    // A patch that lies on a capsule's end is a ball's; one on its side is not.
+    const Vec3 along = tool.shape.b - tool.shape.a;
+    const double length = glm::length(along), r = tool.shape.widest();
+    const double upright =
+        length > 0.0 ? std::abs(glm::dot(along, tool.pushed)) / (length * glm::length(tool.pushed)) : 1.0;
+    const double round = std::max(upright * r, byDepth - length) / byDepth;
+    if (round <= 0.0) {
+        return byDepth;
+    }
+    const double byForce = std::min(std::cbrt(0.75 * r * load * load / indented), 2.0 * byDepth);
+    return round < 1.0 ? byDepth * std::pow(byForce / byDepth, round) : byForce;
 }
 
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept

@@ -25,7 +25,7 @@ struct HeldTool {
     double depth = 0;     // to which the surface sank into it in the last call [m]
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
-    double indented = 0;  // the same of each, as radiusOfPatch() takes it [N Pa m^1.5]
+    double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
