@@ -43,23 +43,20 @@ double radiusOfPatch(const ElasticTool& tool) noexcept
     return std::sqrt(tool.shape.widest() * glm::length(tool.pushed));
 }
 
-double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept
+double radiusOfPatch(const ElasticTool& tool, double load, double indented, double onEnds) noexcept
 {
-    const double byDepth = radiusOfPatch(tool);
-    if (!(load > 0.0) || !(byDepth > 0.0)) {
+    const double byDepth = radiusOfPatch(tool), round = load > 0.0 ? 2.0 * onEnds / load - 1.0 : 0.0;
+    if (!(byDepth > 0.0) || round <= 0.0) {
         return byDepth;
     }
-    // A patch that lies on a capsule's end is a ball's; one on its side is not.
-    const Vec3 along = tool.shape.b - tool.shape.a;
-    const double length = glm::length(along), r = tool.shape.widest();
-    const double upright =
-        length > 0.0 ? std::abs(glm::dot(along, tool.pushed)) / (length * glm::length(tool.pushed)) : 1.0;
-    const double round = std::max(upright * r, byDepth - length) / byDepth;
-    if (round <= 0.0) {
-        return byDepth;
-    }
-    const double byForce = std::min(std::cbrt(0.75 * r * load * load / indented), 2.0 * byDepth);
+    const double byForce = std::min(std::cbrt(0.75 * tool.shape.widest() * load * load / indented), 2.0 * byDepth);
     return round < 1.0 ? byDepth * std::pow(byForce / byDepth, round) : byForce;
+}
+
+bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept
+{
+    constexpr double rounding = 1e-9;  // [m]
+    return shape.a == shape.b || std::abs(glm::dot(normal, shape.b - shape.a) + shape.radiusB - shape.radiusA) > rounding;
 }
 
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept

@@ -158,14 +158,18 @@ double stiffnessUncapped(const ElasticBody& body, double radius) noexcept;
 double stiffestPerArea(const ElasticTool& tool) noexcept;
 /// Of the patch that a tool touches, sqrt(R d) by Hertz [m].
 double radiusOfPatch(const ElasticTool& tool) noexcept;
-/// The same of a ball, or of a capsule that presses with its end, by its force F, a^3 = 3 F R (1 - nu^2) / 4 E: equal on
-/// a half-space, and right as well where something stiff or soft lies under the tissue, or where that gives way as a
-/// whole. What is far from the patch moves all of it alike, which changes the depth but not how the ball lies in it. At
-/// most 2 sqrt(R d), which is that of a thin incompressible layer on something rigid: what it loses under the ball is
-/// what it rises around it.
+/// The same of a ball by its force F, a^3 = 3 F R (1 - nu^2) / 4 E: equal on a half-space, and right as well where
+/// something stiff or soft lies under the tissue, or where that gives way as a whole. What is far from the patch moves all
+/// of it alike, which changes the depth but not how the ball lies in it. At most 2 sqrt(R d), which is that of a thin
+/// incompressible layer on something rigid: what it loses under the ball is what it rises around it. A capsule is a ball
+/// where its end presses; it keeps sqrt(R d) where half of the force is on its side.
 /// @param load      sum of the sizes of its contacts' forces [N]; 0: not known
 /// @param indented  sum of these times E / (1 - nu^2) of their tissue [N Pa]
-double radiusOfPatch(const ElasticTool& tool, double load, double indented) noexcept;
+/// @param onEnds    sum of those on its ends [N]
+double radiusOfPatch(const ElasticTool& tool, double load, double indented, double onEnds) noexcept;
+/// Whether a tool's surface with this normal, a unit vector out of it, is a part of the spheres at its ends: along its side
+/// normals have the angle of its taper to its axis. All of a ball is.
+bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept;
 /// True while that is so small that each surface point is quartered.
 /// @param spacing  of the finest cells [m]
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept;

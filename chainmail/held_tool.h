@@ -26,6 +26,7 @@ struct HeldTool {
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
     double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
+    double onEnds = 0;    // and of those on its ends, which is all of a ball's [N]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
@@ -36,7 +37,7 @@ struct HeldTool {
     /// Nothing is known yet of this call's contacts.
     void forgetContacts() noexcept
     {
-        depth = sunk = load = indented = stretch = 0.0;
+        depth = sunk = load = onEnds = indented = stretch = 0.0;
         lag = Vec3(0.0);
     }
     /// The tool for this call, as deep as the last one lets it go.

@@ -39,11 +39,10 @@ struct DeviceSample {
     datasets::ProbeMove probe{};  // of the hand that holds the ultrasound probe, beside the scene's script
 };
 
-/// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
 /// A button that is heeded once as it goes down.
 struct PressedButton {
-    std::uint32_t button;
-    bool down = false;
+    std::uint32_t button;  // button.. and the two marks above
+    bool down = false;     // in the last sample
 
     /// Whether it has gone down with this sample.
     bool with(const DeviceSample& sample) noexcept
@@ -53,6 +52,7 @@ struct PressedButton {
     }
 };
 
+/// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
 enum class Task : std::uint8_t { h2, h3, h4, deform, h6, h7, h5, count };
 inline constexpr std::size_t taskCount = static_cast<std::size_t>(Task::count);
 inline constexpr std::array<std::string_view, taskCount> taskNames{"H2", "H3", "H4", "deform", "H6", "H7", "H5"};

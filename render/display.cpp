@@ -13,9 +13,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <string>
+#include <thread>
 #include <utility>
 
 namespace palpate::render {
@@ -118,8 +120,18 @@ PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
 
 PrivateDisplay::~PrivateDisplay()
 {
-    ::kill(server_, SIGTERM);
-    ::waitpid(server_, nullptr, 0);
+    // A server that is asked just before it waits for its clients hears of it with the next event, or after ten minutes.
+    using namespace std::chrono_literals;
+    bool ended = false;
+    for (int i = 0; i < 100 && !ended; ++i) {
+        ::kill(server_, SIGTERM);
+        std::this_thread::sleep_for(20ms);
+        ended = ::waitpid(server_, nullptr, WNOHANG) == server_;
+    }
+    if (!ended) {
+        ::kill(server_, SIGKILL);
+        ::waitpid(server_, nullptr, 0);
+    }
 }
 
 }  // namespace palpate::render

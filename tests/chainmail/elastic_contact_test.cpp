@@ -116,11 +116,29 @@ TEST(ElasticContact, ThePatchByForceIsThatByDepthOnAHalfSpace)
     for (const double d : {0.1e-3, 1e-3, 5e-3}) {
         tool.pushed = Vec3(0.0, d, 0.0);
         const double hertz = 4.0 / 3.0 * modulus * std::sqrt(r) * std::pow(d, 1.5), depth = std::sqrt(r * d);
-        EXPECT_NEAR(radiusOfPatch(tool, hertz, hertz * modulus), depth, 1e-9);
-        EXPECT_NEAR(radiusOfPatch(tool, hertz / 8.0, hertz / 8.0 * modulus), 0.5 * depth, 1e-9) << "on something soft";
-        EXPECT_NEAR(radiusOfPatch(tool, 100.0 * hertz, 100.0 * hertz * modulus), 2.0 * depth, 1e-9) << "on bone";
-        EXPECT_EQ(radiusOfPatch(tool, 0.0, 0.0), radiusOfPatch(tool)) << "not known";
+        const auto radius = [&](double force, double onEnds = 1.0) {
+            return radiusOfPatch(tool, force, force * modulus, onEnds * force);
+        };
+        EXPECT_NEAR(radius(hertz), depth, 1e-9);
+        EXPECT_NEAR(radius(hertz / 8.0), 0.5 * depth, 1e-9) << "on something soft";
+        EXPECT_NEAR(radius(100.0 * hertz), 2.0 * depth, 1e-9) << "on bone";
+        EXPECT_EQ(radius(0.0), radiusOfPatch(tool)) << "not known";
+        EXPECT_EQ(radius(100.0 * hertz, 0.5), radiusOfPatch(tool)) << "half of it on a capsule's side";
+        EXPECT_NEAR(radius(100.0 * hertz, 0.75), std::sqrt(2.0) * depth, 1e-9) << "between both";
     }
+}
+
+// Normals of a tapered capsule: those of its side, and those of the spheres beyond.
+TEST(ElasticContact, ACapsulesEndsAreWhereItsNormalsLeaveTheSide)
+{
+    const occupancy::RoundCone capsule{Vec3(0.0), Vec3(0.03, 0.04, 0.0), 5e-3, 9e-3};
+    const Vec3 axis = glm::normalize(capsule.b - capsule.a), out(0.0, 0.0, 1.0);
+    const double sine = 4e-3 / 0.05;
+    for (const double turn : {-0.8, -0.1, 0.0, 0.1, 1.2}) {
+        const double along = std::sin(turn - std::asin(sine));
+        EXPECT_EQ(isOnEnd(capsule, along * axis + std::sqrt(1.0 - along * along) * out), turn != 0.0) << turn;
+    }
+    EXPECT_TRUE(isOnEnd(tests::ball(Vec3(0.0), 5e-3).shape, out));
 }
 
 // The bound of the contact's stiffness is there for bone: tissue of 300 kPa feels as it does without it. It was 24 % too

@@ -17,6 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <csignal>
+#include <cstdlib>
 
 #include <algorithm>
 #include <array>
@@ -66,12 +67,17 @@ public:
             ::kill(id_, signal);
         wait();
     }
-    // Exit status, or 1000 + signal.
+    // Exit status, or 1000 + signal. One that hangs is killed.
     int wait()
     {
+        constexpr int patience = 12000;  // [10 ms]
         if (id_ > 0) {
             int status = 0;
-            ::waitpid(id_, &status, 0);
+            for (int i = 0; i < patience && ::waitpid(id_, &status, WNOHANG) == 0; ++i)
+                if (std::this_thread::sleep_for(std::chrono::milliseconds(10)); i + 1 == patience) {
+                    ::kill(id_, SIGKILL);
+                    ::waitpid(id_, &status, 0);
+                }
             id_ = 0;
             result_ = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
         }
@@ -377,6 +383,19 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
                    log("viewer"));
     viewer.wait();
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
+}
+
+// A server may be asked to end before it listens (a test with Debian's Xvfb waited 600 s for it, which is a timer of it).
+TEST_F(Viewer, EndsThoughItsServerDoesNot)
+{
+    const fs::path server = folder_ / "Xvfb";
+    std::ofstream(server) << "#!/bin/sh\ntrap '' TERM\necho 77 >&$2\nwhile :; do sleep 0.1; done\n";
+    fs::permissions(server, fs::perms::owner_all);
+    std::vector<std::string> command = view({"--wait", "0.3"});
+    command.insert(command.begin(), {"env", "PATH=" + folder_.string() + ":" + std::getenv("PATH")});
+    Process viewer(command, log("viewer"));
+    EXPECT_EQ(viewer.wait(), 1);
+    EXPECT_EQ(said("viewer").rfind("palpate-view: ", 0), 0U) << said("viewer");
 }
 
 TEST_F(Viewer, TellsInOneLineWhatIsMissing)

@@ -97,7 +97,7 @@ def edit(file, old, new):
 
 CATALOGUE = [
     (lambda root: None, 0, ""),
-    (lambda root: edit(root / "trainer/state.cpp", 'tr("Start")', 'tr("Start at once")'), 1, "'Start at once' is not translated"),
+    (lambda root: edit(root / "trainer/state.cpp", 'marked("Start")', 'marked("Start at once")'), 1, "'Start at once' is not translated"),
     (lambda root: edit(root / "translations/de.po", 'msgstr "Beginnen"', 'msgstr ""'), 1, "'Start' is not translated"),
     (lambda root: edit(root / "translations/de.po", "von 100 Punkten", "von {} Punkten"), 1, "its translation"),
     (lambda root: edit(root / "training/cases/cyst/case.toml", "Reach the cyst,", "Go to the cyst,"), 1, "'Go to the cyst,"),
