@@ -54,10 +54,11 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
                                : "what was recorded differs",
                         *result.firstDifference, record.info().build, result.inWords));
     }
-    const std::string said = record.result("force_hash"), hash = session::hexadecimal(result.forceHash);
-    if (!said.empty() && said != hash) {
-        faults.push_back(
-            fmt::format("the end of the record says that its forces have the hash {}, but they have {}", said, hash));
+    for (const auto& [key, value] : record.results()) {
+        if (key == "force_hash" && value != session::hexadecimal(result.forceHash)) {
+            faults.push_back(fmt::format("the end of the record says that its forces have the hash {}, but they have {}",
+                                         value, session::hexadecimal(result.forceHash)));
+        }
     }
     return haptics::someOf(faults, faults.size());
 }

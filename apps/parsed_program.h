@@ -5,9 +5,9 @@
 #include <command/interrupted.h>
 #include <command/options.h>
 
-#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <string>
@@ -19,7 +19,7 @@ namespace palpate::apps {
 template <typename Work>
 int exitStatus(const CLI::App& app, const Work& work)
 {
-    const auto say = [&](const std::string& what) { fmt::print(stderr, "{}: {}\n", app.get_name(), what); };
+    const auto say = [&](const std::string& what) { std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), what.c_str()); };
     try {
         work();
         return 0;

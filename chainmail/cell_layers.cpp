@@ -54,7 +54,7 @@ public:
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
         const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
         const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
-        const auto below = alongSurface ? std::optional(cellAt(centre - g_.spacing * normal)) : std::nullopt;
+        const auto below = alongSurface ? std::optional(g_.cellOf(centre - g_.spacing * normal)) : std::nullopt;
         const Mean mean = meanOf(at, full, below, normal);
         if (mean.layer <= (alongSurface ? thinnest : thinnestInside) * mean.across) {
             return {1.0, {}};
@@ -72,8 +72,6 @@ private:
         const auto found = mixed_.find(at);
         return found != mixed_.end() ? found->second : nullptr;
     }
-
-    Index3 cellAt(Vec3 point) const { return Index3(glm::floor((point - g_.origin) / g_.spacing)); }
 
     struct Mean {
         double across = 0.0;

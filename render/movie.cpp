@@ -24,7 +24,8 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     : file_(std::move(file)), partial_(file_.string() + ".part"), window_(window)
 {
     std::array<int, 2> ends{};
-    base::failIf(::pipe2(ends.data(), O_CLOEXEC) != 0, "{}: {}", file_.native(), std::strerror(errno));
+    const bool none = ::pipe2(ends.data(), O_CLOEXEC) != 0;
+    base::failIf(none, "{}: {}", file_.native(), std::strerror(errno));
     base::Descriptor from(ends[0]);
     pipe_ = base::Descriptor(ends[1]);
     // An ffmpeg that has ended is an error of write(), and no signal.

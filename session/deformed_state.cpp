@@ -69,8 +69,9 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
                      "computed",
                      file, next);
         const haptics::TickRecord& now = simulation.tick(then.device);
+        const bool same = comparison.add(then, now);
         base::failIf(
-            !comparison.add(then, now),
+            !same,
             "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was changed: {}", file,
             next, record.info().build, comparison.inWords());
         if (each) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
@@ -67,6 +68,8 @@ struct NodeGrid {
     }
     Index3 node(std::size_t offset) const noexcept;                                // the reverse of offset()
     Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }  // of a node [m]
+    /// The lowest node of the cell that a place lies in, which may be outside of the grid.
+    Index3 cellOf(Vec3 at) const noexcept { return Index3(glm::floor((at - origin) / spacing)); }
     /// Whether there is such a node.
     bool contains(Index3 n) const noexcept
     {

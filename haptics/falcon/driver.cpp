@@ -1,5 +1,7 @@
 #include <haptics/falcon/driver.h>
 
+#include <haptics/falcon/trouble_if.h>
+
 #include <sched.h>
 #include <sys/prctl.h>
 

@@ -1,5 +1,7 @@
 #include <haptics/falcon/firmware.h>
 
+#include <haptics/falcon/trouble_if.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -89,10 +91,10 @@ void compareEcho(std::span<const std::uint8_t> sent, std::span<const std::uint8_
     const auto at = offset + static_cast<std::size_t>(there - sent.begin());
     const std::string what =
         back == echo.end() ? std::string("did not come back") : fmt::format("came back as 0x{:02x}", *back);
-    throw Trouble(Cause::garbled,
-                  "firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a hub, or "
-                  "take another cable",
-                  at + 1, total, *there, what);
+    troubleIf(true, Cause::garbled,
+              "firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a hub, or "
+              "take another cable",
+              at + 1, total, *there, what);
 }
 
 // What the bytes are where they cannot be a program for a processor; empty where they may be.
@@ -129,7 +131,7 @@ Firmware readFirmware(const std::filesystem::path& file)
 {
     Firmware firmware{file.string(), {}};
     const auto refuse = [&](const std::string& what) {
-        throw Trouble(Cause::firmwareFile, "{}: {}: give the file with the Falcon's firmware", file.string(), what);
+        throw Trouble(Cause::firmwareFile, file.string() + ": " + what + ": give the file with the Falcon's firmware");
     };
     // By its size before a byte is read: a device such as /dev/zero has no end.
     std::error_code none;

@@ -1,5 +1,7 @@
 #include <haptics/falcon/link.h>
 
+#include <haptics/falcon/trouble_if.h>
+
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 

@@ -1,14 +1,11 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace palpate::falcon {
 
@@ -33,25 +30,12 @@ enum class Cause : std::uint8_t {
 
 class Trouble : public std::runtime_error {
 public:
-    template <typename... Values>
-    explicit Trouble(Cause cause, fmt::format_string<Values...> what, Values&&... values)
-        : std::runtime_error(fmt::format(what, std::forward<Values>(values)...)), cause_(cause)
-    {
-    }
+    Trouble(Cause cause, const std::string& what) : std::runtime_error(what), cause_(cause) {}
     Cause cause() const noexcept { return cause_; }
 
 private:
     Cause cause_;
 };
-
-/// Throws that trouble if `wrong`. The values are evaluated in any case.
-template <typename... Values>
-void troubleIf(bool wrong, Cause cause, fmt::format_string<Values...> what, Values&&... values)
-{
-    if (wrong) {
-        throw Trouble(cause, what, std::forward<Values>(values)...);
-    }
-}
 
 /// Tells the user something, one line.
 using Say = std::function<void(const std::string&)>;

@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <haptics/falcon/bytes.h>
 #include <haptics/falcon/guardian.h>
+#include <haptics/falcon/trouble_if.h>
 
 #include <fmt/format.h>
 

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <glm/geometric.hpp>
@@ -262,6 +263,8 @@ void onThreads(std::size_t count, int jobs, const std::function<void(std::size_t
                const std::function<void(std::size_t)>& told)
 {
     std::atomic<std::size_t> done{0};
+    // An arena alone has no more threads than the machine has cores.
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(jobs) + 1);
     tbb::task_arena arena(jobs);
     auto all = std::async(std::launch::async, [&] {
         arena.execute([&] {

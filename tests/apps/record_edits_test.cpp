@@ -64,6 +64,8 @@ const std::vector<Edit> edits{
     {"UPDATE structures SET warn_distance_m = 0.5 WHERE structure = 1", "warning distances", "structures.1", true},
     {"UPDATE results SET value = '100.0' WHERE key = 'score_total'", "score_total", "its total is 96.4"},
     {"UPDATE results SET value = '0' WHERE key = 'force_hash'", "force_hash", "its forces have the hash"},
+    {"UPDATE results SET value = '' WHERE key = 'force_hash'", "force_hash", "results.force_hash"},
+    {"INSERT INTO results VALUES ('force_hash', '0')", "force_hash", "results.force_hash"},
     {"DELETE FROM seal", "the seal is gone", "the seal is gone"},
     {"DELETE FROM seal; DELETE FROM session WHERE key = 'complete'", "open", "open"},
     {"PRAGMA user_version = 3", "has no seal, and here one is", "has no seal, and here one is", true},
@@ -155,6 +157,21 @@ TEST_F(RecordEdits, AFullDeviceBehindTheOutputIsAnError)
         EXPECT_NE(outcome.err.find("standard output"), std::string::npos) << command << ": " << outcome.err;
     }
     expectRefusal({"score", original(), "--json", "/dev/full"}, "/dev/full: cannot be written");
+    // Nor can the error be said there.
+    EXPECT_EQ(Program("/bin/sh", {"-c", palpateProgram() + " score none.db 2> /dev/full"}).wait().status, 1);
+}
+
+// What is computed on the way to a state names what differs, too.
+TEST_F(RecordEdits, AStateOfAnEditedRecordIsNotExported)
+{
+    const Folder folder;
+    const std::string file = edited("UPDATE ticks SET total_y_n = total_y_n + 1e-12 WHERE tick = 500");
+    const std::string out = folder / "state.nrrd";
+    const Outcome exported = palpate({"export", "--record", file, "--at", "1s", "-o", out});
+    EXPECT_EQ(exported.status, 1);
+    EXPECT_NE(exported.err.find("differs from tick 500 on"), std::string::npos) << exported.err;
+    EXPECT_NE(exported.err.find("total_y_n"), std::string::npos) << exported.err;
+    EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 // No room for a byte (RLIMIT_FSIZE; the signal that comes with it is ignored, as on a disk that is full).

@@ -191,7 +191,8 @@ template <typename Result, typename Read>
 Result apart(const std::filesystem::path& path, const char* library, const ImportOptions& options, const Read& read)
 {
     int ends[2];
-    refuseIf(::pipe2(ends, O_CLOEXEC) != 0, path, "no pipe for reading it can be made ({}): try again",
+    const bool none = ::pipe2(ends, O_CLOEXEC) != 0;
+    refuseIf(none, path, "no pipe for reading it can be made ({}): try again",
              std::strerror(errno));
     const pid_t child = ::fork();
     if (child == 0) {
