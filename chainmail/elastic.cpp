@@ -304,6 +304,7 @@ void Elastic::measure(ElasticResult& result) noexcept
     result.energy = energy_ + contactEnergy();
     for (HeldTool& held : held_) {
         held.forgetContacts();
+        held.loaded = held.given;
         result.behind = std::max(result.behind, held.behind);
     }
     StretchAt stretchAt(stack_, options_.law);

@@ -158,7 +158,8 @@ void Elastic::spreadPressure() noexcept
             const HeldTool& held = held_[s.owner];
             const double byDepth = radiusOfPatch(tool);
             const bool knowsForce = s.level == 0 && !body.relaxes;
-            const double byForce = knowsForce ? radiusOfPatch(tool, held.load, held.indented, held.onEnds) : byDepth;
+            const double now = held.changed();
+            const double byForce = knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
             patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
             const double shallow = std::max(1.0 - glm::length(tool.pushed) / tool.shape.widest(), 0.0);
             confined = byForce > byDepth ? std::pow(byForce / byDepth, shallow) : 1.0;

@@ -19,6 +19,7 @@ constexpr double onBone = 3.0;         // sinks into a contact that is as stiff 
 constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius: from one on it would slip around the tool
 constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
+constexpr double still = 0.05;        // change of a tool's depth in a call that its patch does not follow, of the depth
 constexpr int maxSteps = 256;        // along a way through the tissue
 constexpr double stop = 4e3;         // of what is held, stiffness [N/m]
 constexpr double mostHeld = 0.5;     // fraction of the tissue around a place that is held, from which on the place is
@@ -96,6 +97,15 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     felt.shape.b -= behind * inward;
     felt.pushed = given * inward;
     return felt;
+}
+
+double HeldTool::changed() const noexcept
+{
+    if (!(loaded > 0.0) || !(given > 0.0)) {
+        return 1.0;
+    }
+    const double change = given / loaded;
+    return std::pow(change / std::clamp(change, 1.0 - still, 1.0 + still), 1.5);
 }
 
 Vec3 HeldTool::ownForce(Vec3 felt) const noexcept

@@ -27,6 +27,7 @@ struct HeldTool {
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
     double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
     double onEnds = 0;    // and of those on its ends, which is all of a ball's [N]
+    double loaded = 0;    // how deep it was then [m]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
@@ -43,6 +44,10 @@ struct HeldTool {
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
     ElasticTool place(const ElasticTool& tool, const ElasticBody& body, bool isSmall, bool holdsBack) noexcept;
+    /// By how much the force of the last call has to be scaled for the depth of this one, to the power of 3/2, where that
+    /// has changed by more than five percent: a tool that leaves is out after a few calls. Less is left as it is, since what
+    /// follows every tremor of a hand makes it larger.
+    double changed() const noexcept;
     /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
     /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
     Vec3 force(Vec3 felt) const noexcept { return outward(ownForce(felt) + blend.offset()); }
