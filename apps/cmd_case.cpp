@@ -8,6 +8,7 @@
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <session/devices.h>
 #include <session/open.h>
@@ -193,9 +194,7 @@ void addCase(CLI::App& app)
     made->add_option("-o,--output", o->made.folder, "Folder of the case; must not exist")->required();
     made->add_option("--title", o->made.title, "Title, a few words");
     made->add_option("--target", o->made.target, "Structure to sample (default: the first tumour)");
-    made->add_option("--difficulty", o->made.difficulty, "Difficulty, 1 to 5")
-        ->check(CLI::Range(1, training::hardest))
-        ->capture_default_str();
+    command::addNumber(*made, "--difficulty", o->made.difficulty, "Difficulty, 1 to 5", 1, training::hardest);
     made->add_option("--licence", o->made.licence, "Licence of the volume");
     made->final_callback([o] { make(*o); });
 }

@@ -255,7 +255,7 @@ void addCurriculum(CLI::App& app)
         for (const auto& [name, value, what] :
              {std::tuple("--people", &o->people, "Simulated people per skill"),
               std::tuple("--sessions", &o->most, "Maximum number of sessions per person")}) {
-            sub->add_option(name, *value, what)->check(CLI::Range(1, 100000))->capture_default_str();
+            command::addNumber(*sub, name, *value, what, 1, 100000);
         }
         sub->add_option("--seed", o->seed, "Seed of all random choices")
             ->capture_default_str()
@@ -270,9 +270,7 @@ void addCurriculum(CLI::App& app)
     CLI::App* const verified =
         c->add_subcommand("verify", "Test a curriculum with simulated people: gates, CUSUM charts, storage of sessions");
     simulated(verified);
-    verified->add_option("--kills", o->kills, "How many times a process that stores sessions is killed")
-        ->check(CLI::Range(0, 10000))
-        ->capture_default_str();
+    command::addNumber(*verified, "--kills", o->kills, "How many times a process that stores sessions is killed", 0, 10000);
     json(verified);
     verified->final_callback([o] { verify(*o); });
 }

@@ -1,13 +1,15 @@
 #include <apps/command.h>
-#include <apps/falcon_buttons.h>
 
 #include <base/child_process.h>
+#include <base/end_in_order.h>
 #include <base/error.h>
 #include <base/quantiles.h>
+#include <command/interrupted.h>
 #include <command/json.h>
 
 #include <session/falcon.h>
 
+#include <haptics/falcon/buttons.h>
 #include <haptics/falcon/force_test.h>
 #include <haptics/falcon/usb.h>
 
@@ -16,10 +18,13 @@
 #include <nlohmann/json.hpp>
 
 #include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -33,7 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double slow = 400.0;  // exchanges per second, below which a hub or a cable is in the way
+constexpr double slow = 400.0;      // exchanges per second, below which a hub or a cable is in the way
+constexpr time_t betweenLooks = 1;  // for a Falcon [s]
 
 struct DevicesArguments {
     session::FalconOptions falcon;
@@ -225,6 +231,51 @@ nlohmann::json list(const DevicesArguments& o)
     }
     say("without a Falcon: --device hand (a scripted trainee), --device mouse (in the viewer's window)");
     return all;
+}
+
+void printLine(const std::string& line)
+{
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+}
+
+// A line for each button that is pressed at the grip of a Falcon, without a force, as long as the program that has started
+// this one runs: "ready: ...", "button NAME", and "waiting: ..." where there is no Falcon or it is no longer there.
+// options: its firmware, which is loaded where it does not run.
+void printButtons(const session::FalconOptions& options)
+{
+    falcon::LinkOptions link = session::linkOptions(options);
+    link.home = false;
+    const base::EndInOrder untilItsEnd;
+    const pid_t parent = ::getppid();  // without it nobody listens any more
+    const auto ended = [parent] { return base::EndInOrder::asked() || ::getppid() != parent; };
+    std::string before;
+    while (!ended()) {
+        std::string why = "the Falcon stopped answering, or was unplugged";
+        try {
+            const auto wire = falcon::usbTransport();
+            falcon::Link falcon(*wire, link, [](const std::string&) {});
+            falcon.connect(base::EndInOrder::asked());
+            printLine("ready: the buttons of the Falcon's grip, as they are pressed");
+            falcon::watchButtons(
+                falcon, *wire, [](std::uint8_t button) { printLine(fmt::format("button {}", falcon::nameOf(button))); },
+                ended);
+            falcon.close();
+            before.clear();
+        } catch (const std::exception& e) {
+            why = e.what();
+        }
+        if (why != before && !ended()) {
+            printLine("waiting: " + why);
+        }
+        before = why;
+        // A signal ends the sleep.
+        timespec pause{betweenLooks, 0};
+        ended() ? 0 : ::nanosleep(&pause, nullptr);
+    }
+    if (const int signal = base::EndInOrder::signal(); signal != 0) {
+        throw command::Interrupted(signal, "interrupted");
+    }
 }
 
 void devices(const DevicesArguments& o)

@@ -1,14 +1,20 @@
 #include <apps/command.h>
-#include <apps/export_ct.h>
-#include <apps/export_ultrasound.h>
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
+#include <channel/deformation.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
+#include <ct/scanner.h>
 #include <datasets/label_map.h>
+#include <haptics/recorder.h>
+#include <haptics/score.h>
 #include <session/deformed_state.h>
 #include <session/open.h>
+#include <ultrasound/placement.h>
+#include <ultrasound/scanner.h>
+#include <ultrasound/stored_image.h>
 #include <volume/export.h>
 
 #include <fmt/format.h>
@@ -18,7 +24,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <optional>
 
 namespace palpate::apps {
 
@@ -148,11 +156,10 @@ void exportVolume(const ExportArguments& o, const volume::ExportOptions& how)
 }
 
 // What to say of it behind the file's name.
-std::string exportState(const ExportArguments& o, const volume::ExportOptions& how, command::Progress& progress,
-                        nlohmann::json& figures)
+std::string exportState(const ExportArguments& o, const volume::ExportOptions& how,
+                        const std::function<void(double)>& progress, nlohmann::json& figures)
 {
-    const session::DeformedState state(o.record, timeFrom(o.at),
-                                       [&](double fraction) { progress.show("computing the session again", fraction); });
+    const session::DeformedState state(o.record, timeFrom(o.at), progress);
     const auto& lattice = state.model().lattice;
     if (o.what == "labels") {
         volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
@@ -172,6 +179,53 @@ std::string exportState(const ExportArguments& o, const volume::ExportOptions& h
     return fmt::format(" at tick {}: {} nodes moved, by up to {:.2f} mm", state.tick(), state.shape().moved().size(), most);
 }
 
+// A CT scan of a record's body at one moment, as a viewer would show it. Returns what to say of it, as those around.
+std::string exportCt(const ExportArguments& o, const std::function<void(double)>& progress)
+{
+    base::failIf(!(haptics::scanDoseOf(haptics::Record(o.record).info()) > 0),
+                 "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
+    const session::ShownState shown = session::shownState(o.record, timeFrom(o.at), std::nullopt, progress);
+    const haptics::Showing& s = shown.showing;
+    channel::Deformation body(s.scenery, s.labels);
+    body.apply(*shown.shape);
+    const ct::Scan scan = ct::Scanner(s.scenery, s.image).scan(shown.state, body);
+    const auto& window = *std::ranges::find(ct::windows, o.window, &ct::Window::name);
+    base::writeWhole(o.output, ct::scanPng(scan, shown.state.tick, s.scenery.ctDoseLength, window, o.height));
+    return fmt::format(" at tick {}: {} slices of {:.1f} mm, {:.1f} mGy cm", shown.state.tick, scan.hu.size(),
+                       1e3 * s.scenery.ctWidth, s.scenery.ctDoseLength);
+}
+
+// The ultrasound picture of a record at one moment, bit for bit as a viewer stores it: with probe, settings, size and
+// moment of the stored image `like`, or the session's own.
+std::string exportUltrasound(const ExportArguments& o, const std::function<void(double)>& progress)
+{
+    std::optional<ultrasound::StoredHow> like;
+    if (!o.like.empty()) {
+        like = ultrasound::readStored(o.like);
+    }
+    const double at = like ? static_cast<double>(like->image.tick) / haptics::Record(o.record).info().rate : timeFrom(o.at);
+    const session::ShownState shown =
+        session::shownState(o.record, at, like ? std::optional(like->image.shapeTick) : std::nullopt, progress);
+    const haptics::Showing& s = shown.showing;
+    ultrasound::Scanner scanner(s.scenery, s.labels, s.fine);
+    channel::Deformation body(s.scenery, s.labels);
+    body.apply(*shown.shape);
+    ultrasound::BeamImage image;
+    image.shapeTick = shown.shape->tick;
+    image.mirrored = like && like->image.mirrored;
+    if (like) {
+        scanner.scan(like->image.transducer, like->image.settings, like->image.pose, body, shown.state, image);
+    } else {
+        const auto e = ultrasound::examinationOf(s.scenery, scanner.medium());
+        scanner.scan(e.transducer, e.settings, ultrasound::poseAt(e, shown.state), body, shown.state, image);
+    }
+    base::writeWhole(o.output,
+                     ultrasound::storedImage(image, like ? like->width : o.width, like ? like->height : o.height));
+    return fmt::format(" at tick {}: {} probe, {:.0f} mm deep", shown.state.tick,
+                       image.transducer.shape == ultrasound::ProbeShape::curved ? "curved" : "linear",
+                       1e3F * image.settings.depth);
+}
+
 void runExport(ExportArguments o)
 {
     checkOptions(o);
@@ -182,16 +236,15 @@ void runExport(ExportArguments o)
     how.progress = [&](double fraction) { progress.show("writing", fraction); };
     nlohmann::json figures{{"file", o.output.string()}, {"what", o.what}};
     std::string more;
+    const auto again = [&](double fraction) { progress.show("computing the session again", fraction); };
     if (o.record.empty()) {
         exportVolume(o, how);
     } else if (o.what == "ultrasound") {
-        more = exportUltrasound({o.output, o.record, o.like.empty() ? timeFrom(o.at) : 0.0, o.like, o.width, o.height},
-                                [&](double fraction) { progress.show("computing the session again", fraction); });
+        more = exportUltrasound(o, again);
     } else if (o.what == "ct") {
-        more = exportCt({o.output, o.record, timeFrom(o.at), o.window, o.height},
-                        [&](double fraction) { progress.show("computing the session again", fraction); });
+        more = exportCt(o, again);
     } else {
-        more = exportState(o, how, progress, figures);
+        more = exportState(o, how, again, figures);
     }
     progress.clear();
     if (o.json != "-") {
@@ -225,15 +278,10 @@ void addExport(CLI::App& app)
         ->type_name("FILE");
     command->add_option("--like", o->like, "Stored ultrasound picture: repeat its time, probe, settings and size")
         ->type_name("FILE.png");
-    command->add_option("--width", o->width, "Width of an ultrasound picture [pixels]")
-        ->check(CLI::Range(100, 8192))
-        ->capture_default_str();
-    command->add_option("--window", o->window, "Grey-level window of a CT scan")
-        ->check(CLI::IsMember(windowChoices))
-        ->capture_default_str();
-    command->add_option("--height", o->height, "Height of an ultrasound picture, or of a slice of a CT scan [pixels]")
-        ->check(CLI::Range(100, 8192))
-        ->capture_default_str();
+    command::addNumber(*command, "--width", o->width, "Width of an ultrasound picture [pixels]", 100, 8192);
+    command::addChoice(*command, "--window", o->window, "Grey-level window of a CT scan", windowChoices);
+    command::addNumber(*command, "--height", o->height,
+                       "Height of an ultrasound picture, or of a slice of a CT scan [pixels]", 100, 8192);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([o] { runExport(*o); });
 }

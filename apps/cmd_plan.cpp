@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <command/json.h>
+#include <command/options.h>
 
 #include <base/error.h>
 #include <base/outputs.h>
@@ -109,8 +110,7 @@ void printReference(const Plan& plan, const planner::PlanCosts& costs, const std
     const auto& [small, finite, move, rest] = costs;
     fmt::print(
         "time is counted: {:g} ns per node and {:g} per node and cycle ({:g} and {:g} with finite strain), {:g} and {:g} "
-        "per "
-        "contact point ({:g} and {:g}), {:g} per node that ChainMail moves, {:g} us for the rest of a tick; {}\n",
+        "per contact point ({:g} and {:g}), {:g} per node that ChainMail moves, {:g} us for the rest of a tick; {}\n",
         small.perSlot, small.perSlotCycle, finite.perSlot, finite.perSlotCycle, small.perContact, small.perContactCycle,
         finite.perContact, finite.perContactCycle, move, rest,
         origin.empty() ? "measured on a Zen 5 server core with AVX-512; 'palpate bench costs' measures yours" : origin);
@@ -173,9 +173,7 @@ void addPlan(CLI::App& app)
         ->capture_default_str();
     command->add_option("--force-error", o->forceError, "Maximum error of the force, e.g. 5% or 0.05 (default: no limit)");
     command->add_option("--budget", o->budget, "Maximum time per tick, e.g. 400us or 0.4ms")->capture_default_str();
-    command->add_option("--speed", o->speed, "Speed of the test push [mm/s]")
-        ->check(CLI::Range(1.0, 1000.0))
-        ->capture_default_str();
+    command::addNumber(*command, "--speed", o->speed, "Speed of the test push [mm/s]", 1.0, 1000.0);
     command->add_flag("--all", o->all, "Try every model within the budget, to see how much a better one costs");
     command
         ->add_option("--costs", o->costs,

@@ -298,18 +298,15 @@ void addPress(CLI::App& app)
         ->type_name("FILE")
         ->required();
     command::addSetting(*c, o->changes);
-    c->add_option("--model", o->level, "Tissue model; only elastic has forces of its own")
-        ->check(CLI::IsMember({"elastic"}))
-        ->capture_default_str();
+    command::addChoice(*c, "--model", o->level, "Tissue model; only elastic has forces of its own", {"elastic"});
     c->add_option("--at", o->at, "Points at rest whose displacement is written: CSV with x_mm,y_mm,z_mm")
         ->type_name("FILE");
     c->add_option("--tool", o->tool, "Kind of tool (default: as in the scene)")->check(CLI::IsMember(toolKinds));
     c->add_option("--radius-mm", o->radius, "Radius of the tool [mm] (default: as in the scene)");
     c->add_option("--length-mm", o->length,
                   "Length of a needle, or between the end centres of a capsule [mm] (default: as in the scene)");
-    c->add_option("--every", o->every, "Interval between samples [ms]; the last tick is always a sample")
-        ->check(CLI::Range(std::size_t{1}, std::size_t{10'000'000}))
-        ->capture_default_str();
+    command::addNumber(*c, "--every", o->every, "Interval between samples [ms]; the last tick is always a sample",
+                       std::size_t{1}, std::size_t{10'000'000});
     c->add_flag("--converge", o->converge, "Solve each sample to convergence, instead of the few cycles of a tick");
     c->add_option("--json", o->json, "Write samples and figures to this file (- = standard output)");
     c->add_option("--csv", o->csv, "Write samples to this file, one per line (- = standard output)");

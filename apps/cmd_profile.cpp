@@ -4,6 +4,7 @@
 #include <base/outputs.h>
 #include <base/user_files.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <training/case.h>
 #include <training/curriculum.h>
 #include <training/store.h>
@@ -162,9 +163,7 @@ void addProfile(CLI::App& app)
         return s;
     };
     CLI::App* const made = sub("new", "Make a profile", true);
-    made->add_option("--hand", o->hand, "Hand that holds the needle")
-        ->check(CLI::IsMember({"right", "left"}))
-        ->capture_default_str();
+    command::addChoice(*made, "--hand", o->hand, "Hand that holds the needle", {"right", "left"});
     made->final_callback([o] { make(*o); });
 
     CLI::App* const changed = sub("hand", "Change the hand that holds the needle", true);

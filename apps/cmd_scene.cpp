@@ -163,8 +163,7 @@ void writeScene(Scene scene, const SceneArguments& o, const FoundWays& found, co
     scene.name = o.output.stem().string();
     std::string comment = fmt::format(
         "# Proposed by palpate scene: way {} of {}, {:.1f} mm to the aim, {} mm from what must not be touched; {}, {:.0f} "
-        "mm "
-        "long.\n# The viewer looks at the plane of this line.\n",
+        "mm long.\n# The viewer looks at the plane of this line.\n",
         o.choose, found.ways.size(), 1e3 * way.length, clearanceText(way), found.needle, 1e3 * scene.tool.length);
     for (const std::string& warning : warnings) {
         comment += fmt::format("# Warning: {}\n", warning);

@@ -163,8 +163,7 @@ void scoreRecord(const ScoreArguments& options)
     const auto groups = base::mapped<report::ScoredGroup>(
         options.groups, [&](const std::string& text) { return parseGroup(text, sessions); });
     base::failIf(sessions.empty(), "score: give at least one record, or --group NAME=FILE,FILE");
-    std::vector<std::filesystem::path> read;
-    std::ranges::transform(sessions, std::back_inserter(read), &Session::file);
+    const auto read = base::mapped<std::filesystem::path>(sessions, &Session::file);
     base::checkNames({options.report});
     base::checkOutputs({options.json, options.report}, read);
     warn(sessions);

@@ -99,11 +99,6 @@ fs::path recordFile(const TrainArguments& o)
     return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
 }
 
-std::string deviceInWords(const TrainArguments& o)
-{
-    return o.trainee.empty() ? o.device : fmt::format("{} (seed {})", o.trainee, o.changes.seed.value_or(1));
-}
-
 // Pictures of a record are those of its events, on a machine that is busy too, and no viewer is beside the servo loop.
 bool drawsLater(const TrainArguments& o)
 {
@@ -355,7 +350,9 @@ void train(TrainArguments o)
     std::string fitted;
     o.changes.fit = o.unpaced ? nullptr : fitToMachine(fitted);
     const auto model = openModel(o);
-    auto info = session::describeSession(model, o.scene, deviceInWords(o));
+    const auto seed = o.changes.seed.value_or(1);
+    auto info = session::describeSession(model, o.scene,
+                                         o.trainee.empty() ? o.device : fmt::format("{} (seed {})", o.trainee, seed));
     info.name = sessionName(o);
     info.operatorName = o.operatorName;
     training.describe(info);
@@ -363,7 +360,7 @@ void train(TrainArguments o)
         info.extra.emplace_back("setting", fitted);
     }
     session::TrainOptions options;
-    options.device = {o.device, o.trainee, o.changes.seed.value_or(1), std::move(falcon)};
+    options.device = {o.device, o.trainee, seed, std::move(falcon)};
     options.session = sessionName(o);
     options.record = record;
     options.servo = {!o.unpaced, o.seconds};
@@ -439,9 +436,7 @@ void addTrain(CLI::App& app)
     c->add_flag("--palpate", o->changes.palpate, "Find the scene's target with a fingertip");
     c->add_option("--lesion-from", o->lesionFrom,
                   "Put a lesion into the volume, at a position from this file (.loc of a VICTRE phantom) chosen by --seed");
-    c->add_option("--lesion-mm", o->lesionDiameter, "Diameter of the lesion [mm]")
-        ->check(CLI::Range(2.0, 50.0))
-        ->capture_default_str();
+    command::addNumber(*c, "--lesion-mm", o->lesionDiameter, "Diameter of the lesion [mm]", 2.0, 50.0);
     c->add_flag("--lesion-sphere", o->sphere, "Make the lesion a sphere, without lobes and spikes");
     c->add_option("--device", o->device, session::devicesInWords())->capture_default_str();
     command::addFalconOptions(*c, o->falcon);
@@ -462,12 +457,10 @@ void addTrain(CLI::App& app)
     c->add_option("--seconds", o->seconds, "Maximum session time [s] (0: no limit)")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "Run as fast as possible, instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default if there is a display)")->excludes(unpaced);
-    c->add_option("--layout", o->layout, "Layout of the window")
-        ->check(CLI::IsMember({"trainee", "instructor"}))
-        ->capture_default_str();
-    c->add_option("--palette", o->palette, "Colours of the window: standard, or colour-blind (with patterns in slices)")
-        ->check(CLI::IsMember({"standard", "colour-blind"}))
-        ->capture_default_str();
+    command::addChoice(*c, "--layout", o->layout, "Layout of the window", {"trainee", "instructor"});
+    command::addChoice(*c, "--palette", o->palette,
+                       "Colours of the window: standard, or colour-blind (with patterns in slices)",
+                       {"standard", "colour-blind"});
     c->add_flag("--sounds", o->sounds, "Play sounds for warnings (in the window)");
     c->add_flag("--tryout", o->tryout, "Learn the controls in 30 s, step by step; no record, no score")
         ->excludes("--case", "--exercise", "--profile", "--test", unpaced);

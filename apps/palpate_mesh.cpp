@@ -17,8 +17,6 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <ctime>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -147,16 +145,14 @@ void addOptions(CLI::App& app, MeshArguments& o)
 {
     app.add_option("volume", o.volume, "Volume (.vdb), scene (.toml), or a built-in phantom by its name");
     app.add_option("-o,--output", o.output, "Mesh to write: " + reference::meshFileEndings())->type_name("FILE");
-    app.add_option("--size", o.size, "Edge length on tissue surfaces [mm]; shorter where a tissue is thin")
-        ->check(CLI::Range(0.2, 50.0))
-        ->type_name("MM")
-        ->capture_default_str();
+    command::addNumber(app, "--size", o.size, "Edge length on tissue surfaces [mm]; shorter where a tissue is thin", 0.2,
+                       50.0)
+        ->type_name("MM");
     app.add_option("--largest", o.largest, "Edge length away from surfaces [mm] (default: 2.5 times --size)")
         ->check(CLI::Range(0.2, 200.0))
         ->type_name("MM");
-    app.add_option("--surface", o.surface, "Method for the surfaces: cgal, or nets (surface nets on voxels of --size)")
-        ->check(CLI::IsMember({"cgal", "nets"}))
-        ->capture_default_str();
+    command::addChoice(app, "--surface", o.surface,
+                       "Method for the surfaces: cgal, or nets (surface nets on voxels of --size)", {"cgal", "nets"});
     app.add_option("--json", o.json, "Write figures to this file (- = standard output)")->type_name("FILE");
 }
 

@@ -24,7 +24,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <ctime>
 #include <string>
 #include <vector>
 
@@ -353,20 +352,14 @@ void addOptions(CLI::App& app, ReferenceArguments& o)
     app.add_option("--law", o.law, "Material law: linear (small strain), or a law of finite strain, as in scenes")
         ->check(CLI::IsMember(std::vector<std::string>(volume::lawNames.begin(), volume::lawNames.end())))
         ->capture_default_str();
-    app.add_option("--elements", o.elements,
-                   "P2, or P2/P1 (Taylor-Hood), which needs fewer tetrahedra in nearly incompressible tissue")
-        ->check(CLI::IsMember({"P2", "P2/P1"}))
-        ->capture_default_str();
-    app.add_option("--mesher", o.mesher,
-                   "Mesher of the tetrahedra between the same surfaces: cgal, or tetgen (runs palpate-mesh)")
-        ->check(CLI::IsMember({"cgal", "tetgen"}))
-        ->capture_default_str();
-    app.add_option("--speed", o.speed, "Speed of the trial, which defines the looks [mm/s]")
-        ->check(CLI::Range(1.0, 1000.0))
-        ->capture_default_str();
-    app.add_option("--size", o.size, "Edge length of tetrahedra at the contact [mm]")
-        ->check(CLI::Range(0.3, 10.0))
-        ->capture_default_str();
+    command::addChoice(app, "--elements", o.elements,
+                       "P2, or P2/P1 (Taylor-Hood), which needs fewer tetrahedra in nearly incompressible tissue",
+                       {"P2", "P2/P1"});
+    command::addChoice(app, "--mesher", o.mesher,
+                       "Mesher of the tetrahedra between the same surfaces: cgal, or tetgen (runs palpate-mesh)",
+                       {"cgal", "tetgen"});
+    command::addNumber(app, "--speed", o.speed, "Speed of the trial, which defines the looks [mm/s]", 1.0, 1000.0);
+    command::addNumber(app, "--size", o.size, "Edge length of tetrahedra at the contact [mm]", 0.3, 10.0);
     app.add_option("--press", o.press, "Depth of the press [mm] (default: as in the trial)")->check(CLI::Range(0.1, 50.0));
     app.add_option("--path-of", o.pathOf, "Press where this reference does (.ref), not at the scene's entry")
         ->check(CLI::ExistingFile);

@@ -98,25 +98,22 @@ void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& w
         ->check(CLI::Range(0.0, 86400.0));
     app.add_option("--ghost", words.ghost,
                    "With --replay: also show the tool of this record in the same body, e.g. an expert's");
-    app.add_option("--palette", words.palette,
-                   "Colours of tissues: standard (as in the body), or colour-blind (with patterns in slices)")
-        ->check(CLI::IsMember({"standard", "colour-blind"}))
-        ->capture_default_str();
+    palpate::command::addChoice(app, "--palette", words.palette,
+                                "Colours of tissues: standard (as in the body), or colour-blind (with patterns in slices)",
+                                {"standard", "colour-blind"});
     app.add_flag("--sounds", options.sounds, "Play sounds for warnings (in a window)");
-    app.add_option("--hand", words.hand, "Hand that holds the mouse; left swaps its buttons")
-        ->check(CLI::IsMember({"right", "left"}))
-        ->capture_default_str();
+    palpate::command::addChoice(app, "--hand", words.hand, "Hand that holds the mouse; left swaps its buttons",
+                                {"right", "left"});
 }
 
 void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
-    app.add_option("--layout", words.layout, "Layout: trainee, instructor, or body (the body alone, without text)")
-        ->check(CLI::IsMember({"trainee", "instructor", "body"}))
-        ->capture_default_str();
-    app.add_option("--slices", words.slices,
-                   "Slices of a body with an image: tissue, tinted (image in the tissues' colours) or image")
-        ->check(CLI::IsMember({"tissue", "tinted", "image"}))
-        ->capture_default_str();
+    palpate::command::addChoice(app, "--layout", words.layout,
+                                "Layout: trainee, instructor, or body (the body alone, without text)",
+                                {"trainee", "instructor", "body"});
+    palpate::command::addChoice(app, "--slices", words.slices,
+                                "Slices of a body with an image: tissue, tinted (image in the tissues' colours) or image",
+                                {"tissue", "tinted", "image"});
     app.add_flag("--ultrasound", options.ultrasound, "Start with the ultrasound picture (key U)");
     app.add_option("--images", options.images, "Folder for stored ultrasound pictures (key P)")->capture_default_str();
     app.add_option("--hide", options.concealed.tissues,
@@ -131,12 +128,10 @@ void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Word
     app.add_option("--timeline", words.timeline,
                    "Write the time at which each tick was shown to this file (CSV, CLOCK_MONOTONIC)");
     app.add_option("--size", words.size, "Size of the picture, WIDTHxHEIGHT [pixels]")->capture_default_str();
-    app.add_option("--every", options.every, "With --offscreen: session time between two pictures [s]")
-        ->check(CLI::Range(0.0, 86400.0))
-        ->capture_default_str();
-    app.add_option("--wait", options.wait, "Time to wait for a session, and to stay open after its end [s]")
-        ->check(CLI::Range(0.0, 86400.0))
-        ->capture_default_str();
+    palpate::command::addNumber(app, "--every", options.every, "With --offscreen: session time between two pictures [s]",
+                                0.0, 86400.0);
+    palpate::command::addNumber(app, "--wait", options.wait,
+                                "Time to wait for a session, and to stay open after its end [s]", 0.0, 86400.0);
     app.add_option("--frames", options.frames, "End after this many pictures (0: no limit)")->capture_default_str();
     app.add_option("--json", words.json, "Write frame times to this file (- = standard output)");
 }

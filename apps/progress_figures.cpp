@@ -1,5 +1,6 @@
 #include <apps/progress_figures.h>
 
+#include <base/mapped.h>
 #include <haptics/measures.h>
 
 #include <nlohmann/json.hpp>
@@ -21,19 +22,10 @@ namespace {
 
 constexpr std::size_t recent = 5;  // sessions of which a median is given
 
-double medianOf(std::vector<double> values)
-{
-    return values.empty() ? NAN : report::quantile(std::move(values), 0.5);
-}
-
 // A value for each session; null where there is none.
 json curveOf(const ExerciseProgress& e, std::string_view key)
 {
-    json curve = json::array();
-    for (const StoredSession& s : e.sessions) {
-        curve.push_back(training::valueIn(s.values, key));
-    }
-    return curve;
+    return base::mapped<json>(e.sessions, [&](const StoredSession& s) { return training::valueIn(s.values, key); });
 }
 
 // Rows as docs/curriculum.md has them: a person, an exercise, a measure.
@@ -56,7 +48,7 @@ void addRows(const PersonProgress& p, const CurriculumProgress& c, const Exercis
                         {"exercise", e.exercise->id},
                         {"measure", key},
                         {"trials", e.sessions.size()},
-                        {"median_last", medianOf(values)},
+                        {"median_last", report::quantile(values, 0.5)},
                         {"curve", curveOf(e, key)},
                         {"cusum",
                          {{"alarm", last.alarm},

@@ -201,8 +201,6 @@ public:
         world_.world.removeRigidBody(&tool_);
         world_.world.removeSoftBody(body_.get());
     }
-    Bullet(const Bullet&) = delete;
-    Bullet& operator=(const Bullet&) = delete;
 
     // The sphere goes straight from one centre to the other. Returns the force on it, the mean of its contacts' impulses
     // [N].

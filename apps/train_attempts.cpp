@@ -1,7 +1,6 @@
 #include <apps/train_attempts.h>
 
 #include <base/utc.h>
-#include <training/progress.h>
 
 #include <fmt/format.h>
 

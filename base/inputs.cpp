@@ -28,10 +28,9 @@ std::string whyNoFile(const std::filesystem::path& file)
     if (error == std::errc::permission_denied) {
         return "cannot be reached: check the permissions of its folder";
     }
-    if (std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))) {
-        return "is a symbolic link to a file that is not there: check where it leads";
-    }
-    return "there is no such file: check the name";
+    return std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))
+               ? "is a symbolic link to a file that is not there: check where it leads"
+               : "there is no such file: check the name";
 }
 
 std::string inWords(const std::filesystem::filesystem_error& error)

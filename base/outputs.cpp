@@ -78,13 +78,10 @@ void checkOutputs(const std::vector<fs::path>& outputs, const std::vector<fs::pa
         checkOutput(*file);
         const auto same = [&](const fs::path& other) { return areOneFile(*file, other); };
         std::error_code none;
-        if (fs::exists(*file, none) && std::ranges::any_of(inputs, same)) {
-            throw std::runtime_error(file->string() +
-                                     ": is a file that is read, and would be replaced: choose another name");
-        }
-        if (std::any_of(outputs.begin(), file, same)) {
-            throw std::runtime_error(file->string() + ": would be written twice: give each file a name of its own");
-        }
+        base::failIf(fs::exists(*file, none) && std::ranges::any_of(inputs, same),
+                     "{}: is a file that is read, and would be replaced: choose another name", file->native());
+        base::failIf(std::any_of(outputs.begin(), file, same),
+                     "{}: would be written twice: give each file a name of its own", file->native());
     }
 }
 
@@ -108,9 +105,8 @@ bool makeFolders(const fs::path& folder)
 {
     std::error_code failed;
     const bool made = fs::create_directories(folder, failed);
-    if (failed) {
-        throw base::error("{}: this folder cannot be made ({}): choose another place", folder.string(), failed.message());
-    }
+    base::failIf(static_cast<bool>(failed), "{}: this folder cannot be made ({}): choose another place", folder.native(),
+                 failed.message());
     return made;
 }
 

@@ -1,5 +1,7 @@
 #include <base/process.h>
 
+#include <base/error.h>
+
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
@@ -13,7 +15,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <stdexcept>
 
 extern char** environ;
 
@@ -90,9 +91,7 @@ int exitStatus(pid_t child) noexcept
 int run(const Program& program)
 {
     const auto [pid, error] = start(program);
-    if (error != 0) {
-        throw std::runtime_error(program.words[0] + ": cannot be started (" + std::strerror(error) + ")");
-    }
+    base::failIf(error != 0, "{}: cannot be started ({})", program.words[0], std::strerror(error));
     return exitStatus(pid);
 }
 

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -36,6 +37,22 @@ inline std::vector<std::string_view> csvCells(std::string_view line)
         cell = trimmed(cell);
     }
     return cells;
+}
+
+/// A text in quotes, as a cell of a CSV file (RFC 4180).
+inline std::string csvQuoted(std::string_view text)
+{
+    std::string out = "\"";
+    for (const char c : text) {
+        out += c == '"' ? "\"\"" : std::string(1, c);
+    }
+    return out + '"';
+}
+
+/// The same, in quotes only where the text needs them.
+inline std::string csvCell(const std::string& text)
+{
+    return text.find_first_of(",\"\r\n") == std::string::npos ? text : csvQuoted(text);
 }
 
 /// Without the '+' before a plain number, which std::from_chars() does not take: "0" for "+0", and "+-0" for "+-0".

@@ -54,7 +54,7 @@ public:
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
         const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
         const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
-        const auto below = alongSurface ? std::optional(g_.cellOf(centre - g_.spacing * normal)) : std::nullopt;
+        const auto below = alongSurface ? std::optional(g_.cellAt(centre - g_.spacing * normal)) : std::nullopt;
         const Mean mean = meanOf(at, full, below, normal);
         if (mean.layer <= (alongSurface ? thinnest : thinnestInside) * mean.across) {
             return {1.0, {}};

@@ -101,7 +101,7 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
 Vec3 anchorOf(const CellLevel& level, Vec3 on, Index3 under)
 {
     const auto& g = level.nodes;
-    const Index3 cell = g.cellOf(on);
+    const Index3 cell = g.cellAt(on);
     if (g.contains(cell) && level.mu[g.offset(cell)] > 0.0F) {
         return on;
     }
@@ -151,7 +151,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             const double distance = surface.at(p);
             const double hat = 1.0 - std::abs(distance) / width;
             const Vec3 on = p - distance * normal;
-            const Index3 under = finest.nodes.cellOf(on - 0.6 * cells.spacing * normal);
+            const Index3 under = finest.nodes.cellAt(on - 0.6 * cells.spacing * normal);
             if (hat <= 0.0 || !finest.nodes.contains(under)) {
                 return;
             }

@@ -92,7 +92,7 @@ inline float diagonalOf(float mu, float lambda, double spacing, const Cut& cut, 
 /// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].
 inline float muAt(const CellLevel& level, Vec3 at) noexcept
 {
-    const Index3 cell = level.nodes.cellOf(at);
+    const Index3 cell = level.nodes.cellAt(at);
     if (!level.nodes.contains(cell)) {
         return 0.0F;
     }
@@ -106,7 +106,7 @@ inline float muAt(const CellLevel& level, Vec3 at) noexcept
 /// Poisson's ratio of the level's cell that a place lies in; that of soft tissue where it is empty or divided.
 inline double poissonAt(const CellLevel& level, Vec3 at) noexcept
 {
-    const Index3 cell = level.nodes.cellOf(at);
+    const Index3 cell = level.nodes.cellAt(at);
     const std::size_t i = level.nodes.contains(cell) ? level.nodes.offset(cell) : 0;
     const auto lambda = static_cast<double>(level.lambda[i]), mu = static_cast<double>(level.mu[i]);
     return level.nodes.contains(cell) && mu > 0.0 ? 0.5 * lambda / (lambda + mu) : softPoisson;

@@ -93,7 +93,7 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         }
         const int scale = 1 << l;
         const auto& finest = body.levels.front().nodes;
-        const Index3 in = finest.cellOf(rest);
+        const Index3 in = finest.cellAt(rest);
         site.fraction = trilinear(at - Vec3(cell));
         site.node = nodeOf(body, windows, l, cell, glm::clamp(in, scale * cell, scale * cell + scale - 1));
         site.level = static_cast<std::uint16_t>(l);

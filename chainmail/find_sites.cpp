@@ -28,7 +28,7 @@ double touchedAtFirst(double radius) noexcept
 double siteStiffness(const ElasticBody& body, const SurfacePoint& p, const ElasticTool& tool) noexcept
 {
     const auto& grid = body.levels.front().nodes;
-    const Index3 cell = grid.cellOf(Vec3(p.anchor));
+    const Index3 cell = grid.cellAt(Vec3(p.anchor));
     const bool givesWay = grid.contains(cell) && body.held[grid.offset(cell)] == 0.0F;
     const double most = stiffestPerArea(tool) * (givesWay ? stiffened : 1.0);
     return std::min(penalty * youngsModulusOf(p.mu) / grid.spacing, most) * static_cast<double>(p.area);

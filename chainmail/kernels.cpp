@@ -2,8 +2,6 @@
 
 #include <chainmail/kernels_sets.h>
 
-#include <array>
-
 namespace palpate::chainmail {
 
 namespace {

@@ -1,6 +1,5 @@
 #include <chainmail/lattice.h>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
@@ -33,23 +32,6 @@ Lattice::Lattice(const volume::NodeGrid& nodes, std::vector<std::uint8_t> tissue
                 {mean(1.0 - a.compress, 1.0 - b.compress), mean(a.stretch - 1.0, b.stretch - 1.0), mean(a.shear, b.shear)});
         }
     }
-}
-
-double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept
-{
-    float worst = 0.0F;
-    for (Node a = 0; a < lattice.tissue.size(); ++a) {
-        if (lattice.tissue[a] == 0) {
-            continue;
-        }
-        for (int side = 1; side < 6; side += 2) {
-            const Node b = lattice.beside(a, side);
-            if (lattice.isNode(b)) {
-                worst = std::max(worst, glm::length(correction(u[b] - u[a], side, lattice.between(a, b))));
-            }
-        }
-    }
-    return static_cast<double>(worst);
 }
 
 }  // namespace palpate::chainmail

@@ -49,9 +49,6 @@ struct Lattice {
     std::array<Node, 6> step{};  // offset of the neighbour on each side, modulo 2^32
 };
 
-/// Largest violation of any link [m], for tests and reports: visits the whole lattice.
-double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept;
-
 /// By how much the end `b` of a link would have to move to make it legal [m].
 ///
 /// With du = u_b - u_a and the link on side 2 k (+ 1 when b lies ahead of a):

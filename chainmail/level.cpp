@@ -100,9 +100,7 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
       period_(options.heldPeriod),
       turns_(body.levels.size(), Index3(0))
 {
-    const Index3 size = elastic_.stack().windows().front().size();
-    const auto cells =
-        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    const std::size_t cells = volume::NodeGrid{elastic_.stack().windows().front().size(), Vec3(0.0), 1.0}.count();
     strained_.assign(shape.u().size(), 0);
     before_.resize(cells);
     now_.resize(cells);

@@ -9,15 +9,11 @@
 
 namespace palpate::chainmail {
 
-namespace {
-
 constexpr int whole = (1 << 20) + 1;  // nodes of a window that holds any level whole
 constexpr QuasiNewton::Limits limits{8, 16};
 constexpr double balanced = 1e-3;    // fraction of the load
 constexpr double atMost = 0.03;      // the same where displacements are too coarse for it
 constexpr double lastBit = 0x1p-24;  // of a number in single precision
-
-}  // namespace
 
 LoadedBody::LoadedBody(const ElasticBody& body)
     : body_(body),

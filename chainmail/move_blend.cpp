@@ -6,8 +6,6 @@
 
 namespace palpate::chainmail {
 
-namespace {
-
 constexpr double wayOfTick = 20e-6;  // of a tool at 20 mm/s: a faster one passes in a tick what this does in several [m]
 // In such ticks:
 constexpr double follows = 8.0;     // from a move on, in which the solution follows it,
@@ -17,8 +15,6 @@ constexpr double fades = 32.0;      // until e^-1 of the offset is left
 constexpr double learns = 0.25;     // of the mean way and change, in a tick
 constexpr double mostOffset = 0.1;  // in the force
 constexpr double mostWays = 2.0;    // way of a tick, in the mean one, up to which the force is foretold
-
-}  // namespace
 
 void MoveBlend::count(Vec3 force, Vec3 at, bool moved) noexcept
 {

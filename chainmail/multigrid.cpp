@@ -7,14 +7,10 @@
 
 namespace palpate::chainmail {
 
-namespace {
-
 constexpr double margin = 1.05;        // on the estimate of the largest eigenvalue
 constexpr double smoothed = 4.0;       // the smoother takes the upper three quarters of the spectrum
 constexpr int coarsestSteps = 4;       // Chebyshev steps on the coarsest level
 constexpr double coarsestSpread = 20;  // largest to smallest eigenvalue there
-
-}  // namespace
 
 Multigrid::Multigrid(WindowStack& stack, std::size_t maxBlocks) : stack_(stack)
 {

@@ -3,9 +3,6 @@
 #include <chainmail/posture_map.h>
 #include <volume/tissue.h>
 
-#include <memory>
-#include <optional>
-
 namespace palpate::chainmail {
 
 /// Under which gravity the shape of a volume was taken, and under which it shall be, patient frame [m/s^2]; zero: unloaded.

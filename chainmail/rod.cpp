@@ -6,8 +6,6 @@
 
 namespace palpate::chainmail {
 
-namespace {
-
 constexpr double pieceLength = 4e-3;  // [m]
 constexpr double narrowest = 0.75;    // radius of a ring, in cells: closer to the axis its place between nodes would count
 constexpr double gives = 1.25;        // the ring's rod over that asked for: so the springs are about as stiff as the cells
@@ -15,8 +13,6 @@ constexpr double shortest = 1.0;      // length over diameter that G is taken fo
 constexpr double leastLack = 0.1;     // of differences of G
 constexpr double acrossToAlong = 4.0 * (1.0 - 0.45) / (3.0 - 4.0 * 0.45);  // of the factors before ln(R / r), at nu = 0.45
 constexpr double fewest = 4.0, standard = 8.0;                             // points
-
-}  // namespace
 
 double piecesOfRod(double length) noexcept
 {

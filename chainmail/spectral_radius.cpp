@@ -9,11 +9,7 @@
 
 namespace palpate::chainmail {
 
-namespace {
-
 constexpr int powerSteps = 30;
-
-}  // namespace
 
 // By power iteration; a start of random signs has a fraction of every eigenvector.
 double spectralRadius(const CellLevel& level)

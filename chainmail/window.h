@@ -7,7 +7,6 @@
 #include <glm/vector_relational.hpp>
 
 #include <array>
-#include <cstdlib>
 #include <new>
 #include <span>
 #include <vector>
@@ -158,8 +157,7 @@ struct Window {
     bool anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept;
     bool contains(Index3 node) const noexcept  // in the level's indices
     {
-        const Index3 n = node - low;
-        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < box.x && n.y < box.y && n.z < box.z;
+        return volume::NodeGrid{box, Vec3(0.0), 1.0}.contains(node - low);
     }
     std::size_t at(Index3 node) const noexcept
     {

@@ -3,7 +3,6 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
-#include <array>
 
 namespace palpate::chainmail {
 

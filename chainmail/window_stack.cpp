@@ -4,7 +4,6 @@
 #include <glm/vector_relational.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 

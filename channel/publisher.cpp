@@ -130,8 +130,6 @@ struct Publisher::Impl {
     Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
          std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine);
     ~Impl();
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
 
     void map(std::size_t bytes);
     void fill(const Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image,

@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 
 #include <cmath>
-#include <string>
 #include <utility>
 
 namespace palpate::command {
@@ -77,12 +76,10 @@ void addFalconOptions(CLI::App& command, session::FalconOptions& options)
 {
     command.add_option("--falcon-firmware", options.firmware,
                        "Firmware file of the Novint Falcon, from its maker; the Falcon loses it without power");
-    command.add_option("--falcon-grip-g", options.grip, "Mass of the Falcon's grip, compensated by its motors [g]")
-        ->check(CLI::Range(0.0, 300.0))
-        ->capture_default_str();
-    command.add_option("--on-unplug", options.onUnplug, "If the Falcon is unplugged: exit, or wait until it is back")
-        ->check(CLI::IsMember({"exit", "wait"}))
-        ->capture_default_str();
+    addNumber(command, "--falcon-grip-g", options.grip, "Mass of the Falcon's grip, compensated by its motors [g]", 0.0,
+              300.0);
+    addChoice(command, "--on-unplug", options.onUnplug, "If the Falcon is unplugged: exit, or wait until it is back",
+              {"exit", "wait"});
 }
 
 void checkFalconOptions(const CLI::App& command, bool falcon)

@@ -5,6 +5,7 @@
 
 #include <CLI/App.hpp>
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,21 @@ namespace palpate::command {
 void addModel(CLI::App& command, session::SceneChanges& changes);
 /// The option --setting of a command.
 void addSetting(CLI::App& command, session::SceneChanges& changes);
+
+/// An option for a number from `least` to `most`; --help shows its default.
+template <typename Value, typename Bound>
+CLI::Option* addNumber(CLI::App& app, const std::string& name, Value& value, const std::string& text, Bound least,
+                       Bound most)
+{
+    return app.add_option(name, value, text)->check(CLI::Range(least, most))->capture_default_str();
+}
+/// An option for one of `choices`; --help shows its default.
+template <typename Value, typename Choices = std::initializer_list<const char*>>
+CLI::Option* addChoice(CLI::App& app, const std::string& name, Value& value, const std::string& text,
+                       const Choices& choices)
+{
+    return app.add_option(name, value, text)->check(CLI::IsMember(choices))->capture_default_str();
+}
 
 /// Empty, or what is wrong with a value of --seed: of a negative or a huge one CLI11 would make another number.
 std::string seedFault(const std::string& text);

@@ -16,8 +16,6 @@ public:
     /// @param clock  ticking: the line goes on counting seconds, from a thread, while nothing new is said
     explicit Progress(Clock clock = Clock::still);
     ~Progress();
-    Progress(const Progress&) = delete;
-    Progress& operator=(const Progress&) = delete;
 
     void show(const std::string& what);
     /// With a bar; `fraction` is what is done, 0 to 1.

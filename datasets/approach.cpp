@@ -299,10 +299,6 @@ void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vect
     }
 }
 
-}  // namespace
-
-namespace {
-
 // All lines to the target that keep `margin` from what is forbidden, or nothing to say how far, the most of `clearances`
 // that some keep; the best first.
 std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optional<double> margin)

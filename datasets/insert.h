@@ -3,7 +3,6 @@
 #include <datasets/scene.h>
 #include <volume/tissue.h>
 
-#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <vector>

@@ -3,7 +3,6 @@
 #include <volume/label_image.h>
 #include <volume/tissue.h>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>

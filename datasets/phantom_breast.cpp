@@ -53,10 +53,7 @@ std::uint16_t labelAt(const BreastShape& shape, const BreastInterior& interior, 
         const bool deep = behind > pectoral + ribRoom;
         return inRib(shape, p, behind) ? rib : deep ? chestWall : muscle;
     }
-    if (interior.gland(p, column)) {
-        return gland;
-    }
-    return interior.ligament(p, column) ? ligament : fat;
+    return interior.gland(p, column) ? gland : interior.ligament(p, column) ? ligament : fat;
 }
 
 // On a coarse grid a thin or steep skin has holes: whatever touches air becomes skin.

@@ -164,10 +164,6 @@ bool fits(const BreastShape& shape, const Lump& lump, const std::vector<Lump>& o
     return true;
 }
 
-}  // namespace
-
-namespace {
-
 // Tries one place for `lump`, drawn at random beside the nipple.
 bool place(const BreastShape& shape, Lump& lump, double depth, const std::vector<Lump>& others, Random& random)
 {

@@ -12,13 +12,9 @@
 
 namespace palpate::datasets {
 
-namespace {
-
 constexpr double maxVoxels = 1024.0 * 1024.0 * 1024.0;
 constexpr double perVoxel = 4.2;  // of a session's memory at its peak, measured from 60 to 450 million voxels [bytes]
 constexpr double giga = 1e9;
-
-}  // namespace
 
 volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high)
 {

@@ -21,12 +21,10 @@ struct Layer {
 
 void requireRoom(bool room, const char* phantom, const PhantomValues& values)
 {
-    if (!room) {
-        throw base::error(
-            "phantom '{}': a tumour of tumour_diameter_mm = {:g} mm finds no room there: make it smaller, or "
-            "the body larger",
-            phantom, values.number("tumour_diameter_mm"));
-    }
+    base::failIf(!room,
+                 "phantom '{}': a tumour of tumour_diameter_mm = {:g} mm finds no room there: make it smaller, or "
+                 "the body larger",
+                 phantom, values.number("tumour_diameter_mm"));
 }
 
 // The label of the layer at `depth`; the last layer goes on.

@@ -157,8 +157,6 @@ ProbePlace probeAfter(const ProbeSpec& probe, const ProbeMove& move) noexcept
     return place;
 }
 
-namespace {
-
 constexpr int maxSlices = 9;
 constexpr int usualSlices = 3;
 
@@ -166,8 +164,6 @@ constexpr std::array<Field<CtSpec>, 2> ctFields{{
     {"slice_mm", "mm", 0.5, 20, 1e-3, &CtSpec::width},
     {"ctdi_mgy", "mGy", 0.1, 100, 1, &CtSpec::doseIndex},
 }};
-
-}  // namespace
 
 void readCt(Section& top, CtSpec& ct)
 {

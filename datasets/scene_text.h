@@ -1,6 +1,5 @@
 #pragma once
 
-#include <datasets/insert.h>
 #include <datasets/scene.h>
 
 #include <cstddef>

@@ -114,10 +114,8 @@ std::string largestStructure(const Tissue& tissue)
 Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, const std::string& target)
 {
     const std::string aim = target.empty() ? lesionOf(tissue) : target;
-    if (aim.empty()) {
-        throw base::error("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}", file.string(),
-                          fmt::join(solidNames(tissue), ", "));
-    }
+    base::failIf(aim.empty(), "{}: no tumour or lesion to aim at: choose with --target NAME, one of {}", file.native(),
+                 fmt::join(solidNames(tissue), ", "));
     Scene scene;
     scene.name = file.stem().string();
     scene.source.file = std::filesystem::absolute(file).lexically_normal();

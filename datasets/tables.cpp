@@ -301,20 +301,9 @@ volume::Acoustics acousticsOf(const volume::TissueRow& row)
         return row.acoustics;
     }
     static const volume::TissueTable known = defaultTissues();
-    const auto standIn = [&]() -> std::string_view {
-        switch (row.role) {
-            case Role::air:
-                return "air";
-            case Role::skin:
-                return "skin";
-            case Role::bone:
-                return "bone";
-            default:
-                return "soft_tissue";
-        }
-    };
+    const bool hasOwn = row.role == Role::air || row.role == Role::skin || row.role == Role::bone;
     const auto same = known.find(row.name);
-    return known.rows[same ? *same : known.find(standIn()).value()].acoustics;
+    return known.rows[same ? *same : known.find(hasOwn ? volume::name(row.role) : "soft_tissue").value()].acoustics;
 }
 
 volume::TissueTable defaultTissues()

@@ -1,13 +1,11 @@
 #pragma once
 
 #include <datasets/scene.h>
-#include <volume/label_image.h>
 #include <volume/tissue_table.h>
 
 #include <filesystem>
 #include <span>
 #include <string>
-#include <vector>
 
 namespace palpate::datasets {
 

@@ -7,11 +7,7 @@
 
 namespace palpate::haptics {
 
-namespace {
-
 constexpr double roundingOff = 1e-9;  // of positions [m]
-
-}  // namespace
 
 void PositionWindow::add(Vec3 at) noexcept
 {

@@ -9,15 +9,11 @@
 
 namespace palpate::haptics {
 
-namespace {
-
 constexpr double shaft = 20e-3;     // of the needle that the plane is laid along [m]
 constexpr double minAlong = 8e-3;   // between tip and shaft in the picture: below, a turn is not asked for [m]
 constexpr double maxTurn = 0.5;     // from where the scene has the probe [rad]
 constexpr double maxSweep = 25e-3;  // likewise [m]
 constexpr double wanderTime = 1.0;  // after so long it has forgotten which way it went [s]
-
-}  // namespace
 
 ProbeHand::ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed, double period)
     : holds_(probe.kind != datasets::ProbeKind::none), skill_(skill), period_(period), random_(seed ^ 0x70726F6265U)

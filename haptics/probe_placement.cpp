@@ -130,9 +130,8 @@ ProbePlan planProbe(const datasets::Scene& scene, const volume::Tissue& tissue, 
         }
     }
     base::failIf(!best,
-                 "{}: [probe] over_target: no needle reaches the target beside the probe at {:.0f} to {:.0f} "
-                 "degrees to its face: "
-                 "give face_mm, direction and lateral",
+                 "{}: [probe] over_target: no needle reaches the target beside the probe at {:.0f} to {:.0f} degrees to "
+                 "its face: give face_mm, direction and lateral",
                  scene.name, flattest / degree, steepest / degree);
     plan.lateral = best->lateral;
     plan.approach.entry = best->entry;

@@ -1,5 +1,7 @@
 #include <haptics/record_format.h>
 
+#include <base/error.h>
+
 #include <cmath>
 #include <limits>
 #include <locale>
@@ -60,9 +62,7 @@ Database::~Database()
 
 void Database::execute(const std::string& sql)
 {
-    if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
-        throw std::runtime_error(sqlite3_errmsg(handle_));
-    }
+    base::failIf(sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK, "{}", sqlite3_errmsg(handle_));
 }
 
 Statement::Statement(const Database& database, const std::string& sql) : database_(database.get())

@@ -1,7 +1,5 @@
 #include <haptics/record_rows.h>
 
-#include <base/error.h>
-
 namespace palpate::haptics::format {
 
 void readEvent(const Statement& row, TickRecord& record)

@@ -56,8 +56,6 @@ public:
     Recorder(const std::filesystem::path& file, const SessionInfo& info);
     /// Writes what is left, marks the session complete and leaves one plain file.
     ~Recorder();
-    Recorder(const Recorder&) = delete;
-    Recorder& operator=(const Recorder&) = delete;
 
     /// From one thread. Wait-free, allocates nothing; a full ring counts a lost record.
     void push(const TickRecord& record) noexcept;

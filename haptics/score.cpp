@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <locale>
 #include <numbers>
 #include <sstream>

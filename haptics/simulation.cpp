@@ -2,7 +2,6 @@
 
 #include <haptics/biopsy.h>
 #include <haptics/events.h>
-#include <haptics/surface_proxy.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

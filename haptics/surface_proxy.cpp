@@ -10,16 +10,12 @@
 
 namespace palpate::haptics {
 
-namespace {
-
 constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
 constexpr double axisStep = 1e-3;       // along the segment, where its deepest place is looked for [m]
 constexpr double asDeep = 0.25e-3;      // places less high over the deepest count, by how much less [m]
 constexpr int mostSteps = 512;          // along the segment
 constexpr double steepestField = 1.75;  // of a distance between its samples: sqrt(3), where each edge of a cell has slope 1
-
-}  // namespace
 
 DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept
 {

@@ -28,10 +28,8 @@ struct Columns {
     void operator()(const char* n, const double& v) { put(n, bitsOf(v), true); }
     void operator()(const char*, const format::Microseconds<const float>&) {}
     void operator()(const char* n, const format::OptionalIndex<const std::uint8_t>& v) { put(n, v.value, false); }
-    void operator()(const char* n, const Phase& v) { put(n, static_cast<std::uint64_t>(v), false); }
-    void operator()(const char* n, const WarningLevel& v) { put(n, static_cast<std::uint64_t>(v), false); }
-    template <class Integer>
-    void operator()(const char* n, const Integer& v)
+    template <class IntegerOrEnum>
+    void operator()(const char* n, const IntegerOrEnum& v)
     {
         put(n, static_cast<std::uint64_t>(v), false);
     }

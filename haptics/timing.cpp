@@ -7,13 +7,9 @@
 
 namespace palpate::haptics {
 
-namespace {
-
 namespace bh = boost::histogram;
 using Axis = bh::axis::regular<double, bh::axis::transform::log>;
 constexpr unsigned bins = 2083;  // 1 % apart over nine decades
-
-}  // namespace
 
 struct Histogram::Impl {
     bh::histogram<std::tuple<Axis>, bh::storage_adaptor<std::vector<std::uint64_t>>> bins_{Axis(bins, 1e-8, 10.0)};

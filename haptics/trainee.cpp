@@ -13,8 +13,6 @@ namespace palpate::haptics {
 
 using datasets::SessionTask;
 
-namespace {
-
 constexpr std::array<Skill, 3> skills{{
     {"novice", 0.20e-3, 4.5e-3, 4e-3, 12e-3, 6e-3, 0.25, 0.35, 0.35, 0.25, 5, 0.22, 10e-3, 2.5e-3, 1.2e-3},
     {"resident", 0.10e-3, 2.5e-3, 2.5e-3, 14e-3, 9e-3, 0.15, 0.28, 0.70, 0.35, 4, 0.12, 8e-3, 1.2e-3, 0.7e-3},
@@ -40,8 +38,6 @@ constexpr int maxRedirects = 4;         // in one pass; then it fires or gives u
 constexpr int maxEntries = 8;
 constexpr int maxStrokes = 12;  // on one line
 constexpr int maxLooks = 4;     // at one picture without the tip; then it goes on blind
-
-}  // namespace
 
 const Skill& skillCalled(std::string_view name)
 {

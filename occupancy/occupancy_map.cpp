@@ -6,12 +6,8 @@
 
 namespace palpate::occupancy {
 
-namespace {
-
 // Tissue may bulge out of the lattice's box by this many elements before it shares the outermost cells.
 constexpr int margin = 4;
-
-}  // namespace
 
 OccupancyMap::OccupancyMap(const volume::NodeGrid& grid, std::span<const std::uint8_t> solid)
     : grid_(grid),

@@ -122,10 +122,9 @@ PlanCosts loadCosts(const std::filesystem::path& file)
         for (const auto& [key, value] : costKeys) {
             const nlohmann::json::json_pointer at(fmt::format("/{}/{}", law, key));
             const auto found = json.is_object() && json.contains(at) ? json.at(at) : nlohmann::json();
-            if (!found.is_number() || !(found.get<double>() >= 0.0)) {
-                throw base::error("{}: no number at {}: 'palpate bench costs --json {}' makes such a file", file.string(),
-                                  at.to_string(), file.string());
-            }
+            base::failIf(!found.is_number() || !(found.get<double>() >= 0.0),
+                         "{}: no number at {}: 'palpate bench costs --json {}' makes such a file", file.native(),
+                         at.to_string(), file.native());
             to->*value = found.get<double>();
         }
     }

@@ -319,11 +319,6 @@ constexpr double nanosecond = 1e-3;  // [us]
 
 using Terms = std::array<double, 4>;
 
-Terms termsOf(const TickWork& w) noexcept
-{
-    return {w.slots, w.slots * w.cycles, w.contacts, w.contacts * w.cycles};
-}
-
 TickSample timed(const chainmail::ElasticBody& body, const studies::TrialPath& path,
                  const chainmail::ElasticOptions& options)
 {
@@ -373,7 +368,8 @@ LawCosts fitCosts(std::span<const TickSample> samples)
     std::array<Terms, n> a{};
     Terms b{};
     for (const TickSample& s : samples) {
-        Terms t = termsOf(s.work);
+        const TickWork& w = s.work;
+        Terms t{w.slots, w.slots * w.cycles, w.contacts, w.contacts * w.cycles};
         for (std::size_t i = 0; i < n; ++i) {
             t[i] *= nanosecond / s.microseconds;
         }

@@ -4,7 +4,6 @@
 #include <datasets/scene.h>
 #include <haptics/session_model.h>
 
-#include <algorithm>
 #include <functional>
 #include <optional>
 #include <span>

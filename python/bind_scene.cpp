@@ -1,5 +1,6 @@
 #include <python/scene_box.h>
 
+#include <base/error.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
@@ -86,11 +87,9 @@ SceneBox withScene(SceneBox box, datasets::Scene scene)
         box.volume = nullptr;
         return box;
     }
-    if (sourceText(before) != sourceText(box.scene)) {
-        throw std::runtime_error(
-            "volume: the volume of this scene is in memory alone and stays as it is: make another one, or save it "
-            "(Volume.save) and make the scene of that file");
-    }
+    base::failIf(sourceText(before) != sourceText(box.scene),
+                 "volume: the volume of this scene is in memory alone and stays as it is: make another one, or save it "
+                 "(Volume.save) and make the scene of that file");
     auto table = datasets::withChanges(box.volume->table(), box.scene.tissueChanges);
     const py::gil_scoped_release others;
     box.volume = std::make_shared<const volume::Tissue>(datasets::withTable(*box.volume, std::move(table)));

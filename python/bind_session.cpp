@@ -10,7 +10,6 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <new>

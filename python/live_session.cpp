@@ -1,5 +1,6 @@
 #include <python/live_session.h>
 
+#include <base/error.h>
 #include <haptics/broadcast.h>
 #include <session/figures.h>
 #include <session/open.h>
@@ -10,7 +11,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <optional>
 #include <stdexcept>
 
 namespace palpate::python {
@@ -27,20 +27,17 @@ UltrasoundPicture LiveUltrasound::picture(const haptics::Simulation& simulation,
                                           const UltrasoundRequest& request)
 {
     constexpr int most = 8192;  // pixels along a side
-    if (request.width < 16 || request.height < 16 || request.width > most || request.height > most) {
-        throw std::runtime_error("ultrasound: width and height are 16 to 8192 pixels");
-    }
+    base::failIf(request.width < 16 || request.height < 16 || request.width > most || request.height > most,
+                 "ultrasound: width and height are 16 to 8192 pixels");
     haptics::showShape(simulation, *shape_);
     shape_->tick = state.tick;
     body_.apply(*shape_);
     ultrasound::Settings settings = examination_.settings;
     if (request.depth > 0) {
         const auto depth = static_cast<float>(request.depth);
-        if (depth < examination_.transducer.shallowest || depth > examination_.transducer.deepest) {
-            throw std::runtime_error(fmt::format("ultrasound: a depth of {:g} m: the probe has {:g} to {:g} m",
-                                                 request.depth, examination_.transducer.shallowest,
-                                                 examination_.transducer.deepest));
-        }
+        base::failIf(depth < examination_.transducer.shallowest || depth > examination_.transducer.deepest,
+                     "ultrasound: a depth of {:g} m: the probe has {:g} to {:g} m", request.depth,
+                     examination_.transducer.shallowest, examination_.transducer.deepest);
         settings.depth = static_cast<float>(request.depth);
         settings = ultrasound::within(settings, examination_.transducer);
     }
@@ -80,11 +77,10 @@ LiveSession::LiveSession(std::shared_ptr<const Modelled> modelled, const std::st
                          const std::string& operatorName)
     : modelled_(std::move(modelled)), session_(modelled_->model, modelled_->info), recordFile_(record), process_(getpid())
 {
-    if (!record.empty() && modelled_->inMemory) {
-        throw std::runtime_error(record +
-                                 ": the volume of this session is in memory alone, and its record could not be "
-                                 "replayed: save the volume (Volume.save) and make the scene of that file");
-    }
+    base::failIf(!record.empty() && modelled_->inMemory,
+                 "{}: the volume of this session is in memory alone, and its record could not be replayed: save the volume "
+                 "(Volume.save) and make the scene of that file",
+                 record);
     if (!record.empty()) {
         recorder_ = std::make_unique<haptics::Recorder>(record, infoFor(*modelled_, operatorName));
     }
@@ -106,9 +102,8 @@ LiveSession::~LiveSession()
 
 LiveSession::Use::Use(LiveSession& session, Purpose purpose) : session_(session)
 {
-    if (session.busy_.test_and_set()) {
-        throw std::runtime_error("the session is at work in another thread: give each thread a session of its own");
-    }
+    base::failIf(session.busy_.test_and_set(),
+                 "the session is at work in another thread: give each thread a session of its own");
     std::string problem;
     if (purpose == Purpose::look) {
         return;
@@ -201,12 +196,8 @@ void LiveSession::close()
     const std::string problem = recorder_->error();
     const std::uint64_t lost = recorder_->lost();
     recorder_.reset();
-    if (!problem.empty()) {
-        throw std::runtime_error(problem);
-    }
-    if (lost > 0) {
-        throw std::runtime_error(fmt::format("{}: {} ticks were lost: record to a faster disk", recordFile_, lost));
-    }
+    base::failIf(!problem.empty(), "{}", problem);
+    base::failIf(lost > 0, "{}: {} ticks were lost: record to a faster disk", recordFile_, lost);
 }
 
 }  // namespace palpate::python

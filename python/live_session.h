@@ -8,7 +8,6 @@
 #include <haptics/recorder.h>
 #include <haptics/scenery.h>
 #include <haptics/simulation.h>
-#include <session/devices.h>
 #include <session/session.h>
 #include <ultrasound/placement.h>
 #include <ultrasound/scanner.h>
@@ -18,7 +17,6 @@
 #include <atomic>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -77,8 +75,6 @@ public:
     /// Throws std::runtime_error, also where the record cannot be made.
     LiveSession(std::shared_ptr<const Modelled> modelled, const std::string& record, const std::string& operatorName);
     ~LiveSession();
-    LiveSession(const LiveSession&) = delete;
-    LiveSession& operator=(const LiveSession&) = delete;
 
     /// What a session is used for: to look at what happened, also after its end, or for more ticks.
     enum class Purpose : std::uint8_t { look, work };

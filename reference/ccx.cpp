@@ -354,10 +354,9 @@ std::vector<Vec3> quadraticNodes(const TetMesh& mesh)
 void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file)
 {
     for (const auto row : mesh.tissue) {
-        if (!volume::isSmall(law) && materials[row].stiffening != 0.0) {
-            throw base::error("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.string(),
-                              materials[row].stiffening);
-        }
+        base::failIf(!volume::isSmall(law) && materials[row].stiffening != 0.0,
+                     "{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.native(),
+                     materials[row].stiffening);
     }
 }
 
@@ -449,10 +448,9 @@ std::vector<CcxSolution> runCcxPress(const std::filesystem::path& file, std::siz
     int status = 0;
     const std::filesystem::path results = resultsOf(file, status);
     const std::vector<Block> u = blocksOf(results, "displacements"), force = blocksOf(results, "for set TOOL");
-    if (status != 0 || u.size() != stepsPerCentre * steps || force.size() != u.size()) {
-        throw base::error("{}: ccx solved {} of {} steps (exit status {}): ccx.log says why", file.string(),
-                          std::min(u.size(), force.size()) / stepsPerCentre, steps, status);
-    }
+    base::failIf(status != 0 || u.size() != stepsPerCentre * steps || force.size() != u.size(),
+                 "{}: ccx solved {} of {} steps (exit status {}): ccx.log says why", file.native(),
+                 std::min(u.size(), force.size()) / stepsPerCentre, steps, status);
     std::vector<CcxSolution> solutions;
     for (std::size_t i = stepsPerCentre - 1; i < u.size(); i += stepsPerCentre) {
         const auto& total = force[i].at(0);

@@ -1,7 +1,6 @@
 #include <base/error.h>
 #include <base/units.h>
 #include <reference/finite_elements.h>
-#include <reference/tissue_terms.h>
 
 #include <getfem/getfem_generic_assembly.h>
 #include <getfem/getfem_interpolation.h>

@@ -213,9 +213,7 @@ Maker makerOf(const std::filesystem::path& file)
     static const std::map<std::string, Maker> makers{
         {".vtu", vtuText}, {".vtk", vtkText}, {".msh", mshText}, {".inp", inpText}};
     const auto found = makers.find(file.extension().string());
-    if (found == makers.end()) {
-        throw base::error("{}: a mesh is written as {}: name it so", file.string(), meshFileEndings());
-    }
+    base::failIf(found == makers.end(), "{}: a mesh is written as {}: name it so", file.native(), meshFileEndings());
     return found->second;
 }
 

@@ -146,10 +146,6 @@ private:
     std::vector<char> fixed_;
 };
 
-}  // namespace
-
-namespace {
-
 void movePoints(TetMesh& mesh, double target, Moving moving)
 {
     Improver improver(mesh, moving);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <reference/tet_mesh.h>
-#include <volume/tissue_table.h>
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,6 @@
 #include <reference/press_path.h>
 
 #include <base/mapped.h>
-#include <studies/kernel/kernel_trial.h>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>

@@ -30,12 +30,7 @@ struct SoftVoxels {
     std::vector<std::uint8_t> row;
     bool held = false;  // there is tissue that holds the body
 
-    std::size_t offset(Index3 n) const noexcept
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(size.x) +
-               static_cast<std::size_t>(n.x);
-    }
+    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
 };
 
 // The voxels that the body's box touches.

@@ -43,12 +43,7 @@ struct SmoothLabels {
     std::vector<double> within;
     Vec3 from{0.0}, to{0.0};  // ends of the line [m]
 
-    std::size_t offset(Index3 n) const noexcept
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(size.x) +
-               static_cast<std::size_t>(n.x);
-    }
+    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
     std::size_t samples() const noexcept { return offset({0, 0, size.z}); }
     std::span<const Share> at(std::size_t sample) const noexcept
     {

@@ -29,18 +29,13 @@ public:
         for (int a = 0; a < 3; ++a) {
             count_[a] = std::max(1, static_cast<int>(std::lround(spacing[a] * labels.size[a] / size)));
         }
-        region_.assign(
-            static_cast<std::size_t>(count_.x) * static_cast<std::size_t>(count_.y) * static_cast<std::size_t>(count_.z),
-            -1);
+        region_.assign(base::countOf(count_), -1);
         volume::forEachIndex(Index3(0), count_ - 1,
                              [&](Index3 n) { region_[at(n)] = regionAt(labels_, place(Vec3(n) + 0.5)); });
     }
 
     Index3 count() const noexcept { return count_; }
-    bool has(Index3 n) const noexcept
-    {
-        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < count_.x && n.y < count_.y && n.z < count_.z;
-    }
+    bool has(Index3 n) const noexcept { return base::holds(count_, n); }
     // -1 outside
     int region(Index3 n) const noexcept { return has(n) ? region_[at(n)] : -1; }
     std::uint8_t row(Index3 n) const noexcept
@@ -53,12 +48,7 @@ public:
     {
         return labels_.affine.toPatient(Vec3(labels_.low) - 0.5 + q * Vec3(labels_.size) / Vec3(count_));
     }
-    std::size_t at(Index3 n) const noexcept
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(count_.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(count_.x) +
-               static_cast<std::size_t>(n.x);
-    }
+    std::size_t at(Index3 n) const noexcept { return base::offsetOf(count_, n); }
     bool onFlatSide(int axis, int corner) const noexcept
     {
         return (corner == 0 && labels_.flat[static_cast<std::size_t>(2 * axis)]) ||
@@ -83,10 +73,7 @@ class Net {
 public:
     Net(const SmoothLabels& labels, const Cells& cells) : labels_(labels), cells_(cells)
     {
-        const Index3 corners = cells.count() + 1;
-        number_.assign(
-            static_cast<std::size_t>(corners.x) * static_cast<std::size_t>(corners.y) * static_cast<std::size_t>(corners.z),
-            noNode);
+        number_.assign(base::countOf(cells.count() + 1), noNode);
         for (int axis = 0; axis < 3; ++axis) {
             Index3 first(0);
             first[axis] = -1;
@@ -160,11 +147,7 @@ public:
 private:
     std::uint32_t numberOf(Index3 corner)
     {
-        const Index3 corners = cells_.count() + 1;
-        const std::size_t at = (static_cast<std::size_t>(corner.z) * static_cast<std::size_t>(corners.y) +
-                                static_cast<std::size_t>(corner.y)) *
-                                   static_cast<std::size_t>(corners.x) +
-                               static_cast<std::size_t>(corner.x);
+        const std::size_t at = base::offsetOf(cells_.count() + 1, corner);
         if (number_[at] == noNode) {
             number_[at] = static_cast<std::uint32_t>(points_.size());
             points_.push_back({corner, Vec3(corner), {}, {}});

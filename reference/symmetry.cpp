@@ -20,10 +20,9 @@ int twicePlane(const volume::LabelImage& image, int axis)
     const double twice = 2.0 * origin[axis];
     const double spacing = image.affine.spacing()[axis];
     const bool aligned = std::abs(std::abs(image.affine.linear[axis][axis]) - spacing) < between * spacing;
-    if (!aligned || std::abs(twice - std::round(twice)) > between || std::lround(twice) % 2 == 0) {
-        throw base::error("volume: the plane {} = 0 does not run between voxels: solve all of it",
-                          "xyz"[static_cast<std::size_t>(axis)]);
-    }
+    base::failIf(!aligned || std::abs(twice - std::round(twice)) > between || std::lround(twice) % 2 == 0,
+                 "volume: the plane {} = 0 does not run between voxels: solve all of it",
+                 "xyz"[static_cast<std::size_t>(axis)]);
     return static_cast<int>(std::lround(twice));
 }
 
@@ -34,10 +33,9 @@ void checkSymmetry(const volume::LabelImage& image, const std::vector<std::uint8
         Index3 other = n;
         other[axis] = twice - n[axis];
         const bool in = other[axis] >= 0 && other[axis] < image.size[axis];
-        if (rows[image.values[image.offset(n)]] != (in ? rows[image.values[image.offset(other)]] : 0)) {
-            throw base::error("volume: tissues differ across the plane {} = 0: solve all of it",
-                              "xyz"[static_cast<std::size_t>(axis)]);
-        }
+        base::failIf(rows[image.values[image.offset(n)]] != (in ? rows[image.values[image.offset(other)]] : 0),
+                     "volume: tissues differ across the plane {} = 0: solve all of it",
+                     "xyz"[static_cast<std::size_t>(axis)]);
     });
 }
 

@@ -50,9 +50,7 @@ TetGenResult run(const TetGenJob& job, const TetGenOptions& options)
         throw std::runtime_error(child.killed() ? "it crashed" : fmt::format("it took over {:g} s", options.seconds));
     }
     TetGenResult result = readResult(out);
-    if (!result.error.empty()) {
-        throw std::runtime_error(result.error);
-    }
+    base::failIf(!result.error.empty(), "{}", result.error);
     return result;
 }
 
@@ -117,12 +115,10 @@ void checkVolumes(const TetMesh& mesh, const Surfaces& surfaces)
     }
     const std::vector<double> made = volumesOf(mesh, rows);
     for (std::size_t row = 0; row < wanted.size(); ++row) {
-        if (std::abs(made[row] - wanted[row]) > sameVolume * all) {
-            throw base::error(
-                "TetGen's mesh has {:g} ml of tissue {} where its surfaces enclose {:g} ml: "
-                "take another --size",
-                1e6 * made[row], row, 1e6 * wanted[row]);
-        }
+        base::failIf(std::abs(made[row] - wanted[row]) > sameVolume * all,
+                     "TetGen's mesh has {:g} ml of tissue {} where its surfaces enclose {:g} ml: "
+                     "take another --size",
+                     1e6 * made[row], row, 1e6 * wanted[row]);
     }
 }
 

@@ -10,18 +10,12 @@
 #include <array>
 #include <chrono>
 #include <cstring>
-#include <string>
-#include <vector>
 
 namespace palpate::render {
-namespace {
-
 using base::marked;
 using base::tr;
 
 constexpr std::array<const char*, ct::windows.size()> windowNames{marked("soft tissue"), marked("lung"), marked("bone")};
-
-}  // namespace
 
 CtPicture::CtPicture(vtkRenderer& renderer)
 {

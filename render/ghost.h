@@ -1,7 +1,5 @@
 #pragma once
 
-#include <channel/layout.h>
-
 #include <glm/vec3.hpp>
 
 #include <vector>

@@ -1,6 +1,5 @@
 #include <base/error.h>
 #include <base/outputs.h>
-#include <base/png.h>
 #include <render/events.h>
 #include <render/follower.h>
 #include <render/hosts.h>

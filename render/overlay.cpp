@@ -147,15 +147,9 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
 
 std::string phaseWords(const channel::State& state)
 {
-    switch (state.phase) {
-        case channel::Phase::contact:
-            return tr("touching the body");
-        case channel::Phase::inserted:
-            return said(tr("inserted {:.1Lf} mm"), state.inserted * 1e3);
-        case channel::Phase::free:
-            break;
-    }
-    return tr("in the air");
+    return state.phase == channel::Phase::contact    ? tr("touching the body")
+           : state.phase == channel::Phase::inserted ? said(tr("inserted {:.1Lf} mm"), state.inserted * 1e3)
+                                                     : tr("in the air");
 }
 
 void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::State& state)

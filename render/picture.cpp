@@ -9,12 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include <algorithm>
-#include <array>
-#include <chrono>
 #include <cmath>
-#include <utility>
-#include <vector>
 
 namespace palpate::render {
 namespace {

@@ -13,9 +13,7 @@
 #include <render/screen_plan.h>
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
-#include <render/traces.h>
 #include <render/ultrasound_picture.h>
-#include <render/view_frame.h>
 #include <render/volume_picture.h>
 
 #include <vtkNew.h>
@@ -39,8 +37,6 @@ namespace palpate::render {
 class Picture {
 public:
     explicit Picture(vtkRenderWindow& window);
-    Picture(const Picture&) = delete;
-    Picture& operator=(const Picture&) = delete;
     ~Picture();
 
     /// Takes a session's scenery on; the camera starts anew.

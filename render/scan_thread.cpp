@@ -3,14 +3,9 @@
 #include <base/processor_time.h>
 
 #include <algorithm>
-#include <utility>
 
 namespace palpate::render {
-namespace {
-
 constexpr std::size_t cineLength = 150;  // pictures: five seconds
-
-}  // namespace
 
 ScanThread::ScanThread(const channel::Scenery& scenery, std::span<const std::uint8_t> labels,
                        std::span<const std::uint8_t> fine)

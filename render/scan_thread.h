@@ -34,8 +34,6 @@ public:
 
     /// Copies what it is given.
     ScanThread(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint8_t> fine);
-    ScanThread(const ScanThread&) = delete;
-    ScanThread& operator=(const ScanThread&) = delete;
     ~ScanThread();
 
     /// What there is to see now. `shape`: null when it is as before.

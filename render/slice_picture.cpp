@@ -13,9 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <utility>
-#include <vector>
 
 namespace palpate::render {
 namespace {

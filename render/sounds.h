@@ -26,8 +26,6 @@ public:
     /// @param say  is told why nothing can be heard
     explicit Sounds(std::function<void(const std::string&)> say);
     ~Sounds();
-    Sounds(const Sounds&) = delete;
-    Sounds& operator=(const Sounds&) = delete;
 
     /// Never waits.
     void heed(const channel::State& state);

@@ -5,12 +5,8 @@
 #include <algorithm>
 
 namespace palpate::render {
-namespace {
-
 constexpr double fullDeflection = 350;  // of an axis, as the daemon counts
 constexpr double longestPeriod = 0.1;   // [s]: after a pause the first event has all of it
-
-}  // namespace
 
 SpaceMouse::SpaceMouse() : connected_(spnav_open() == 0) {}
 

@@ -10,8 +10,6 @@
 #include <cmath>
 
 namespace palpate::render {
-namespace {
-
 using base::marked;
 
 constexpr int steps = 6;
@@ -31,8 +29,6 @@ constexpr std::array<const char*, steps> byDevice{
     marked("Go on until it touches the skin: you feel the tissue"),
     marked("Draw back until the tool is free"),
     marked("The forward button fires, S pauses, the left button held for a second ends. Try what you like")};
-
-}  // namespace
 
 bool Tryout::done(const channel::Scenery& scenery, const channel::State& state, bool held)
 {

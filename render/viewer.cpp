@@ -8,12 +8,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <csignal>
 #include <cstdlib>
 #include <iterator>
-#include <optional>
-#include <string>
 #include <thread>
 
 namespace palpate::render {

@@ -23,11 +23,7 @@
 #include <string>
 
 namespace palpate::render {
-namespace {
-
 using units::mm;
-
-}  // namespace
 
 std::uint8_t byteOf(float part) noexcept
 {

@@ -109,8 +109,7 @@ std::string axisBelow(const Range& range, double finest, double y, const auto& x
     for (double at = std::ceil(range.low / step - 1e-9) * step; at <= range.high + 1e-9 * step; at += step) {
         out += fmt::format(
             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" class=\"axis\"/><text x=\"{0:.1f}\" "
-            "y=\"{3:.1f}\" "
-            "text-anchor=\"middle\">{4:.{5}f}</text>",
+            "y=\"{3:.1f}\" text-anchor=\"middle\">{4:.{5}f}</text>",
             x(at), y, y + 4, y + 15, at + 0.0, decimals);
     }
     return out;
@@ -259,9 +258,8 @@ std::string groupsPart(const std::vector<ScoredGroup>& groups)
     }
     std::string body =
         "<header><div><h1>Groups compared</h1><p class=\"key\">" + names +
-        "</p><p>A dot is a session, the bar goes from the lower to the upper quartile, the line is the "
-        "median; a dot beyond the "
-        "axis has no value. Cliff's delta says how much more often a value of " +
+        "</p><p>A dot is a session, the bar goes from the lower to the upper quartile, the line is the median; a dot "
+        "beyond the axis has no value. Cliff's delta says how much more often a value of " +
         escape(groups[0].name) +
         " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
         "are small, medium and large. It needs two sessions with a value in each group; values that are the "

@@ -1,5 +1,6 @@
 #include <report/html.h>
 
+#include <base/mapped.h>
 #include <base/shell_word.h>
 #include <base/spoken.h>
 #include <datasets/tables.h>
@@ -23,37 +24,16 @@ using haptics::EventKind;
 std::string escape(std::string_view text)
 {
     std::string out;
+    constexpr std::string_view special = "&<>\"'";
+    constexpr std::array<std::string_view, 5> entities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
     for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            case '\'':
-                out += "&#39;";
-                break;
-            default:
-                out += c;
-        }
+        const std::size_t at = special.find(c);
+        out += at < special.size() ? entities[at] : std::string_view(&c, 1);
     }
     return out;
 }
 
 namespace {
-
-// For tissues that the built-in table does not have.
-std::string otherColour(std::size_t i)
-{
-    return "var(--c" + std::to_string(i % 8) + ")";
-}
 
 std::string nameOf(const std::vector<std::string>& names, std::size_t i)
 {
@@ -150,11 +130,9 @@ std::string embedded(const nlohmann::json& data)
 
 nlohmann::json numbers(const std::vector<double>& values)
 {
-    nlohmann::json out = nlohmann::json::array();
-    for (const double v : values) {
-        out.push_back(std::isfinite(v) ? nlohmann::json(std::round(v * 1e4) / 1e4) : nlohmann::json());
-    }
-    return out;
+    return base::mapped<nlohmann::json>(values, [&](const double v) {
+        return std::isfinite(v) ? nlohmann::json(std::round(v * 1e4) / 1e4) : nlohmann::json();
+    });
 }
 
 nlohmann::json axis(std::string_view name, std::string_view unit)
@@ -205,8 +183,7 @@ std::string header(const ReportData& d, const haptics::Record& record, const std
     if (!record.complete()) {
         out +=
             "<p class=\"warning\">The program that wrote this record was stopped before the session ended. Everything up "
-            "to "
-            "half a second before that is here.</p>";
+            "to half a second before that is here.</p>";
     }
     if (d.faulted) {
         out +=
@@ -274,7 +251,7 @@ std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
             }
             const std::string name = escape(nameOf(info.tissues, t));
             std::string colour = t < info.tissues.size() ? tissueColour(info.tissues[t]) : "";
-            colour = colour.empty() ? otherColour(met.at(t)) : colour;
+            colour = colour.empty() ? fmt::format("var(--c{})", met.at(t) % 8) : colour;
             bar += fmt::format("<i style=\"width:{:.2f}%;background:{}\" title=\"{}: {:.1f} %\"></i>", percent, colour,
                                name, percent);
             key += fmt::format("<span><i style=\"background:{}\"></i>{} {:.1f} %</span>", colour, name, percent);
@@ -305,11 +282,10 @@ std::string timingCard(const ReportData& d, const haptics::Record& record)
     const double period = 1e6 / rate;
     std::string out = fmt::format(
         "<section class=\"card\"><h2>Time of a tick</h2><p class=\"note\">{} ticks at {:.0f} Hz, {:.0f} &micro;s each; "
-        "{:.2f} % of them "
-        "without a fresh pose of the device.{}</p><div class=\"scroll\"><table "
-        "class=\"plain\"><thead><tr><th>Task</th><th></th><th "
-        "class=\"n\">p50 &micro;s</th><th class=\"n\">p99 &micro;s</th><th class=\"n\">largest &micro;s</th><th "
-        "class=\"bar\">p99 as a share of the tick</th></tr></thead><tbody>",
+        "{:.2f} % of them without a fresh pose of the device.{}</p><div class=\"scroll\"><table "
+        "class=\"plain\"><thead><tr><th>Task</th><th></th><th class=\"n\">p50 &micro;s</th><th class=\"n\">p99 "
+        "&micro;s</th><th class=\"n\">largest &micro;s</th><th class=\"bar\">p99 as a share of the "
+        "tick</th></tr></thead><tbody>",
         d.ticks, rate, period, d.missing * 100, lateness(record));
     const auto row = [&](std::string_view style, std::string_view code, std::string_view what, const TaskTime& t) {
         out += fmt::format(

@@ -154,10 +154,8 @@ std::string pathCard(const ReportData& d, const haptics::SessionInfo& info)
         "inside; brown dots where the tip met the skin" +
         dots +
         ", the blue dashed line along the planned direction through the target's middle; dark bars are the notches at "
-        "firing, dark dots the trainee's marks. The disc is a ball of the target's "
-        "volume "
-        "where it lies at rest, in the viewer's colour.</p><div "
-        "class=\"pictures\" style=\"grid-template-columns:repeat(auto-fit,minmax(220px,1fr))\">";
+        "firing, dark dots the trainee's marks. The disc is a ball of the target's volume where it lies at rest, in the "
+        "viewer's colour.</p><div class=\"pictures\" style=\"grid-template-columns:repeat(auto-fit,minmax(220px,1fr))\">";
     for (const View& view : views) {
         out += draw(view, frame, d, target, colour);
     }

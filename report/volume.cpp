@@ -1,7 +1,5 @@
 #include <report/volume.h>
 
-#include <volume/provenance.h>
-
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

@@ -8,11 +8,7 @@
 
 namespace palpate::session {
 
-namespace {
-
 constexpr double gravity = 9.81;  // [m/s^2]
-
-}  // namespace
 
 void sayForFalcon(const std::string& what)
 {

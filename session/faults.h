@@ -72,8 +72,6 @@ public:
     /// @param record  the file that cannot grow    @param stall  stops (true) or lets go on (false) the viewers
     FaultsAround(Faults faults, std::filesystem::path record, std::function<void(bool)> stall);
     ~FaultsAround();
-    FaultsAround(const FaultsAround&) = delete;
-    FaultsAround& operator=(const FaultsAround&) = delete;
 
     void tell(std::uint64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }  // from the servo thread
 

@@ -9,15 +9,11 @@
 
 namespace palpate::session {
 
-namespace {
-
 constexpr int ticks = 40;
 constexpr double stride = 1e-4;   // of the tool per tick [m]
 constexpr double patience = 0.3;  // [s]
 constexpr double pacedLimit = 5 * haptics::tickSeconds;
 constexpr double unpacedLimit = 60 * haptics::tickSeconds;
-
-}  // namespace
 
 Rehearsal rehearse(const haptics::SessionModel& model)
 {

@@ -8,12 +8,8 @@ namespace palpate::session {
 
 using namespace haptics;
 
-namespace {
-
 constexpr std::size_t maxCores = 64;
 constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
-
-}  // namespace
 
 Session::Session(const SessionModel& model, const SessionInfo& info) : simulation_(model), info_(info), watch_(info)
 {

@@ -103,9 +103,8 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
     const auto parts = base::splitAt('.', key);
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
         toml::node* next = table->get(parts[i]);
-        if (next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script")) {
-            throw base::error("key '{}': the scene has no [[{}]]", key, parts[i]);
-        }
+        base::failIf(next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script"),
+                     "key '{}': the scene has no [[{}]]", key, parts[i]);
         if (next == nullptr && i + 2 == parts.size() && axisOf(parts.back()) < 3) {
             next = table->insert(parts[i], toml::array(0.0, 0.0, 0.0)).first->second.as_array();
             points.try_emplace(pointOf(key));
@@ -158,15 +157,8 @@ constexpr std::array<std::string_view, 3> needleKeys{"depth_mm", "speed_mm_s", "
 
 std::span<const std::string_view> keysOf(ProcedureKind kind)
 {
-    switch (kind) {
-        case ProcedureKind::session:
-            return sessionKeys;
-        case ProcedureKind::press:
-            return pressKeys;
-        case ProcedureKind::needle:
-            break;
-    }
-    return needleKeys;
+    const std::array<std::span<const std::string_view>, 3> keys{sessionKeys, pressKeys, needleKeys};
+    return keys[static_cast<std::size_t>(kind)];
 }
 
 // Refuses keys that only another kind of procedure has: they would do nothing.
@@ -277,10 +269,7 @@ KeyValue Axis::level(std::size_t index) const
     if (!values.empty()) {
         return values[index];
     }
-    if (index + 1 == steps) {
-        return at(1.0);
-    }
-    return at(static_cast<double>(index) / static_cast<double>(steps - 1));
+    return index + 1 == steps ? at(1.0) : at(static_cast<double>(index) / static_cast<double>(steps - 1));
 }
 
 SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)

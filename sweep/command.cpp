@@ -7,6 +7,7 @@
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <sweep/pool.h>
 #include <sweep/report.h>
@@ -297,10 +298,8 @@ void merge(const SweepArguments& o)
     PoolResult result;
     result.done = came;
     const auto missing = conclude(o, folder, result, 0, casesOfShard("1/1", folder.plan().cases()));
-    if (!missing.empty()) {
-        throw base::error("{}: {} of {} cases are missing: run them with --cases {}, and merge again", o.folder,
-                          missing.size(), folder.plan().cases(), listOfCases(missing));
-    }
+    base::failIf(!missing.empty(), "{}: {} of {} cases are missing: run them with --cases {}, and merge again", o.folder,
+                 missing.size(), folder.plan().cases(), listOfCases(missing));
 }
 
 void report(const SweepArguments& o)
@@ -391,10 +390,8 @@ void addSweep(CLI::App& app)
                     fmt::join(builtInPlans(), ", ")));
     c->add_option("-o,--output", o->folder, "Folder of the sweep; an interrupted sweep is resumed");
     c->add_flag("--dry-run", o->dry, "Run three cases, and print the number of cases and the expected time and disk space");
-    c->add_option("--jobs", o->jobs,
-                  "Number of processes, one core each (default: all cores); the table does not depend on it")
-        ->check(CLI::Range(1, 1024))
-        ->capture_default_str();
+    command::addNumber(*c, "--jobs", o->jobs,
+                       "Number of processes, one core each (default: all cores); the table does not depend on it", 1, 1024);
     addParts(*c, *o);
     auto* slurm = c->add_flag("--slurm", o->onSlurm, "Run as a Slurm job array: submit, watch, submit lost tasks again");
     c->add_option("--partition", o->slurm.partition, "Partition of the cluster (default: as in the plan)")->needs(slurm);

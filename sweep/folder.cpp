@@ -96,9 +96,8 @@ template <class T>
 T valueOf(const json& entry, const char* key, bool (json::*is)() const noexcept, const char* what)
 {
     const auto at = entry.find(key);
-    if (at == entry.end() || !((*at).*is)()) {
-        throw base::error("key {} is {}{}", key, at == entry.end() ? "missing, and should be " : "no ", what);
-    }
+    base::failIf(at == entry.end() || !((*at).*is)(), "key {} is {}{}", key,
+                 at == entry.end() ? "missing, and should be " : "no ", what);
     return at->get<T>();
 }
 
@@ -145,9 +144,7 @@ void SweepFolder::begin()
 {
     std::error_code failed;
     fs::create_directories(folder_ / "cases", failed);
-    if (failed) {
-        throw base::error("{}: cannot be made ({})", folder_.string(), failed.message());
-    }
+    base::failIf(static_cast<bool>(failed), "{}: cannot be made ({})", folder_.string(), failed.message());
     const std::string scene = datasets::sceneText(plan_.base);
     base::writeWhole(folder_ / "scene.toml", scene);
     const json about{{"name", plan_.name}, {"inputs", inputsOf(plan_.base)}, {"own", ownOf(plan_.text, scene)}};
@@ -189,12 +186,10 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
     const json own = ownOf(plan_.text, textOf(folder_ / "scene.toml"));
     for (const auto& [name, hash] : own.items()) {
         // A folder of an older build has no hash.
-        if (about.contains("own") && hash != about["own"].value(name, std::string())) {
-            throw base::error(
-                "{}: was changed since the sweep began, and the cases that are done are of the old one: bring it "
-                "back, or begin in another folder",
-                (folder_ / name).string());
-        }
+        base::failIf(about.contains("own") && hash != about["own"].value(name, std::string()),
+                     "{}: was changed since the sweep began, and the cases that are done are of the old one: bring it "
+                     "back, or begin in another folder",
+                     (folder_ / name).native());
     }
     plan_.name = about.value("name", plan_.name);
     if (const json now = inputsOf(plan_.base); about.value("inputs", json()) != now) {

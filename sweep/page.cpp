@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <sweep/report.h>
 
 #include <report/assets.h>
@@ -29,10 +30,7 @@ json axesOf(const SweepPlan& plan)
     for (const auto& a : plan.axes) {
         const bool words = !a.values.empty() &&
                            (std::holds_alternative<std::string>(a.values[0]) || std::holds_alternative<bool>(a.values[0]));
-        json values = json::array();
-        for (const auto& v : a.values) {
-            values.push_back(valueOf(v));
-        }
+        json values = base::mapped<json>(a.values, valueOf);
         out.push_back({{"name", a.name}, {"key", a.key}, {"log", a.log}, {"words", words}, {"values", values}});
     }
     return out;

@@ -22,9 +22,7 @@
 #include <memory>
 #include <new>
 #include <set>
-#include <stdexcept>
 #include <thread>
-#include <vector>
 
 namespace palpate::sweep {
 
@@ -211,9 +209,7 @@ PoolResult runPool(std::size_t count, int jobs, const PoolWork& work)
             std::this_thread::sleep_for(lookEvery);
         }
     }
-    if (shared.failed) {
-        throw std::runtime_error(shared.error.data());
-    }
+    base::failIf(shared.failed, "{}", shared.error.data());
     return {shared.done, std::chrono::duration<double>(Clock::now() - begin).count(), cpuOfChildren() - cpu};
 }
 

@@ -254,15 +254,9 @@ ProcedureResult carryOut(const haptics::SessionModel& model, const haptics::Sess
                          std::uint64_t seed, haptics::Recorder* recorder, const haptics::TickSink& also)
 {
     const Run run{model, info, recorder, also};
-    switch (procedure.kind) {
-        case ProcedureKind::press:
-            return press(run, procedure);
-        case ProcedureKind::needle:
-            return needle(run, procedure);
-        case ProcedureKind::session:
-            break;
-    }
-    return wholeSession(run, procedure, seed);
+    return procedure.kind == ProcedureKind::press    ? press(run, procedure)
+           : procedure.kind == ProcedureKind::needle ? needle(run, procedure)
+                                                     : wholeSession(run, procedure, seed);
 }
 
 }  // namespace palpate::sweep

@@ -35,11 +35,9 @@ std::pair<std::size_t, std::size_t> partOf(const std::string& shard)
 
 void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
 {
-    if (from.plan().text != to.plan().text ||
-        datasets::sceneText(from.plan().base) != datasets::sceneText(to.plan().base)) {
-        throw base::error("{}: is of another plan or scene than {}: it cannot be merged", from.path().string(),
-                          to.path().string());
-    }
+    base::failIf(
+        from.plan().text != to.plan().text || datasets::sceneText(from.plan().base) != datasets::sceneText(to.plan().base),
+        "{}: is of another plan or scene than {}: it cannot be merged", from.path().native(), to.path().native());
 }
 
 // Of plans that keep records. Whole or not at all: there is no row of it yet.
@@ -93,12 +91,10 @@ void checkOneBuild(const SweepFolder& to, const std::vector<std::optional<SweepR
     for (const auto& [index, merged] : come) {
         builds.insert(merged.row.build);
     }
-    if (builds.size() > 1 && !come.empty()) {
-        throw base::error(
-            "{}: the shards are of different builds, {}: compute them with one build, or add --any-build (the "
-            "table names the build of each case)",
-            to.path().string(), fmt::join(builds, " and "));
-    }
+    base::failIf(builds.size() > 1 && !come.empty(),
+                 "{}: the shards are of different builds, {}: compute them with one build, or add --any-build (the "
+                 "table names the build of each case)",
+                 to.path().native(), fmt::join(builds, " and "));
 }
 
 }  // namespace
@@ -121,12 +117,10 @@ std::vector<std::size_t> remainingCases(const SweepFolder& folder, const CasesWa
             others.insert(rows[i]->build);
         }
     }
-    if (!others.empty() && !cases.empty() && !wanted.anyBuild) {
-        throw base::error(
-            "{}: holds cases of build {}, and this is build {}: use that build, or add --any-build (the table "
-            "names the build of each case)",
-            folder.path().string(), fmt::join(others, ", "), std::string(base::build()));
-    }
+    base::failIf(!others.empty() && !cases.empty() && !wanted.anyBuild,
+                 "{}: holds cases of build {}, and this is build {}: use that build, or add --any-build (the table "
+                 "names the build of each case)",
+                 folder.path().native(), fmt::join(others, ", "), std::string(base::build()));
     return cases;
 }
 

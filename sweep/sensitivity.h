@@ -2,7 +2,6 @@
 
 #include <sweep/design.h>
 
-#include <cstdint>
 #include <span>
 #include <vector>
 

@@ -95,8 +95,7 @@ Ranking rankingOf(const SweepPlan& plan)
         case DesignKind::saltelli:
             return {
                 "Sobol's indices: shares of the variance, with all that an axis has a part in (total) and by itself "
-                "(first); "
-                "errors: half of a 95 % interval",
+                "(first); errors: half of a 95 % interval",
                 {"total", "total_error", "first", "first_error"},
                 bySobol};
         case DesignKind::morris:

@@ -23,7 +23,6 @@
 #include <memory>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 #include <thread>
 
 namespace palpate::sweep {
@@ -53,9 +52,7 @@ Answer ask(const std::vector<std::string>& words)
     }
     const auto closed = [](FILE* f) { pclose(f); };
     std::unique_ptr<FILE, decltype(closed)> pipe(popen((line + "2>&1").c_str(), "r"), closed);
-    if (!pipe) {
-        throw std::runtime_error(words[0] + ": cannot be started");
-    }
+    base::failIf(!pipe, "{}: cannot be started", words[0]);
     Answer answer;
     std::array<char, 4096> part{};
     while (const std::size_t n = std::fread(part.data(), 1, part.size(), pipe.get())) {
@@ -114,10 +111,8 @@ public:
             file, json{{"folder", folder_.path().string()}, {"lock", folder_.lock().id()}, {"chunks", chunks}}.dump());
         base::writeWhole(script, scriptText(file, chunks.size()));
         const Answer answer = ask({"sbatch", "--parsable", script.string()});
-        if (answer.status != 0) {
-            throw std::runtime_error(
-                "sbatch: " + (answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.text)));
-        }
+        base::failIf(answer.status != 0, "sbatch: {}",
+                     answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.text));
         s.job = answer.text.substr(answer.text.rfind('\n') + 1);
         s.job = s.job.substr(0, s.job.find(';'));
         jobs_.push_back(std::move(s));
@@ -132,9 +127,7 @@ public:
             const Answer answer = ask({"squeue", "-h", "-r", "-j", s.job, "-o", "%K %T"});
             const bool gone = answer.text.find("Invalid job id") != std::string::npos;
             if (answer.status != 0 && !gone) {
-                if (++silence_ > maxSilence) {
-                    throw std::runtime_error("squeue: " + oneLine(answer.text));
-                }
+                base::failIf(++silence_ > maxSilence, "squeue: {}", oneLine(answer.text));
                 running += s.tasks.size();
                 continue;
             }
@@ -267,9 +260,8 @@ void workOnChunk(const fs::path& file, int jobs, const std::string& build)
         }
     }
     const auto told = [&](std::size_t, std::size_t) {
-        if (FolderLock::holder(folder.path()) != lock) {
-            throw std::runtime_error(folder.path().string() + ": the run that submitted this task is over: the task ends");
-        }
+        base::failIf(FolderLock::holder(folder.path()) != lock,
+                     "{}: the run that submitted this task is over: the task ends", folder.path().native());
         return true;
     };
     runLocally(folder, cases, jobs, build, told, [] { return false; });

@@ -2,7 +2,9 @@
 
 #include <base/error.h>
 #include <base/mapped.h>
+#include <base/split.h>
 #include <datasets/scene_text.h>
+#include <haptics/record_format.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,14 +12,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
-#include <stdexcept>
 #include <system_error>
 
 namespace palpate::sweep {
 
 namespace {
 
+using haptics::format::Database;
+using haptics::format::Statement;
 using Cell = SweepTable::Cell;
 
 Cell cellOf(const KeyValue& value)
@@ -58,18 +60,6 @@ std::vector<SweepTable::Column> columnsOf(const SweepPlan& plan)
     return out;
 }
 
-std::string quoted(const std::string& text)
-{
-    if (text.find_first_of(",\"\r\n") == std::string::npos) {
-        return text;
-    }
-    std::string out = "\"";
-    for (const char c : text) {
-        out += c == '"' ? "\"\"" : std::string(1, c);
-    }
-    return out + "\"";
-}
-
 std::string csvCell(const Cell& cell)
 {
     return std::visit(
@@ -78,7 +68,7 @@ std::string csvCell(const Cell& cell)
             if constexpr (std::is_same_v<Value, std::monostate>) {
                 return "";
             } else if constexpr (std::is_same_v<Value, std::string>) {
-                return quoted(v);
+                return base::csvCell(v);
             } else {
                 return fmt::format("{}", v);
             }
@@ -86,92 +76,47 @@ std::string csvCell(const Cell& cell)
         cell);
 }
 
-std::string identifier(const std::string& name)
+void bind(Statement& row, int at, const Cell& cell)
 {
-    return "\"" + name + "\"";
+    std::visit(
+        [&](const auto& v) {
+            if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::monostate>) {
+                row.bindNull(at);
+            } else {
+                row.bind(at, v);
+            }
+        },
+        cell);
 }
 
-// A database that is being written.
-class Database {
-public:
-    explicit Database(const std::filesystem::path& file)
-    {
-        check(sqlite3_open(file.c_str(), &db_));
-        run("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN");
+// Inserts rows into a table of so many columns.
+void insert(const Database& db, const std::string& table, std::size_t columns, const std::vector<std::vector<Cell>>& rows)
+{
+    const std::vector<std::string> marks(columns, "?");
+    Statement made(db, fmt::format("INSERT INTO {} VALUES ({})", table, fmt::join(marks, ", ")));
+    for (const auto& row : rows) {
+        for (std::size_t i = 0; i < columns; ++i) {
+            bind(made, static_cast<int>(i) + 1, row[i]);
+        }
+        made.run();
     }
-    ~Database() { sqlite3_close_v2(db_); }
-    Database(const Database&) = delete;
-    Database& operator=(const Database&) = delete;
-
-    void run(const std::string& sql) { check(sqlite3_exec(db_, sql.c_str(), nullptr, nullptr, nullptr)); }
-
-    // One row into a table of so many columns.
-    void insert(const std::string& table, const std::vector<Cell>& cells)
-    {
-        if (table != table_) {
-            const std::vector<std::string> marks(cells.size(), "?");
-            sqlite3_stmt* made = nullptr;
-            const std::string sql = fmt::format("INSERT INTO {} VALUES ({})", table, fmt::join(marks, ", "));
-            check(sqlite3_prepare_v2(db_, sql.c_str(), -1, &made, nullptr));
-            statement_.reset(made);
-            table_ = table;
-        }
-        sqlite3_stmt* const s = statement_.get();
-        for (std::size_t i = 0; i < cells.size(); ++i) {
-            bind(s, static_cast<int>(i) + 1, cells[i]);
-        }
-        if (sqlite3_step(s) != SQLITE_DONE) {
-            check(sqlite3_errcode(db_));
-        }
-        check(sqlite3_reset(s));
-    }
-
-private:
-    struct Finalize {
-        void operator()(sqlite3_stmt* s) const { sqlite3_finalize(s); }
-    };
-
-    void bind(sqlite3_stmt* s, int at, const Cell& cell)
-    {
-        if (const auto* const v = std::get_if<std::int64_t>(&cell)) {
-            check(sqlite3_bind_int64(s, at, *v));
-        } else if (const auto* const d = std::get_if<double>(&cell)) {
-            check(sqlite3_bind_double(s, at, *d));
-        } else if (const auto* const t = std::get_if<std::string>(&cell)) {
-            check(sqlite3_bind_text(s, at, t->c_str(), static_cast<int>(t->size()), SQLITE_TRANSIENT));
-        } else {
-            check(sqlite3_bind_null(s, at));
-        }
-    }
-    void check(int code)
-    {
-        if (code != SQLITE_OK) {
-            throw std::runtime_error(db_ != nullptr ? sqlite3_errmsg(db_) : "no memory");
-        }
-    }
-
-    sqlite3* db_ = nullptr;
-    std::string table_;
-    std::unique_ptr<sqlite3_stmt, Finalize> statement_;
-};
+}
 
 void fill(Database& db, const SweepTable& table, const SweepPlan& plan)
 {
-    const auto names = base::mapped<std::string>(table.columns, [&](const auto& c) { return identifier(c.name); });
-    db.run(
+    const auto names =
+        base::mapped<std::string>(table.columns, [](const auto& c) { return fmt::format("\"{}\"", c.name); });
+    db.execute("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; BEGIN");
+    db.execute(
         fmt::format("CREATE TABLE results ({}); CREATE TABLE columns (name TEXT, kind TEXT, meaning TEXT); CREATE TABLE "
                     "sweep (key TEXT, value TEXT)",
                     fmt::join(names, ", ")));
-    for (const auto& c : table.columns) {
-        db.insert("columns", {c.name, c.kind, c.meaning});
-    }
-    db.insert("sweep", {std::string("name"), plan.name});
-    db.insert("sweep", {std::string("plan"), plan.text});
-    db.insert("sweep", {std::string("scene"), datasets::sceneText(plan.base)});
-    for (const auto& row : table.rows) {
-        db.insert("results", row);
-    }
-    db.run("COMMIT");
+    insert(db, "columns", 3, base::mapped<std::vector<Cell>>(table.columns, [](const auto& c) {
+               return std::vector<Cell>{c.name, c.kind, c.meaning};
+           }));
+    insert(db, "sweep", 2, {{"name", plan.name}, {"plan", plan.text}, {"scene", datasets::sceneText(plan.base)}});
+    insert(db, "results", names.size(), table.rows);
+    db.execute("COMMIT");
 }
 
 }  // namespace
@@ -222,7 +167,7 @@ void writeDatabase(const std::filesystem::path& file, const SweepTable& table, c
     std::filesystem::remove(half, ignored);
     try {
         {
-            Database db(half);
+            Database db(half.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
             fill(db, table, plan);
         }
         std::filesystem::rename(half, file);

@@ -18,8 +18,6 @@ public:
     Errands(std::filesystem::path programs, ResultSink& sink);
     /// Ends what runs, in order.
     ~Errands();
-    Errands(const Errands&) = delete;
-    Errands& operator=(const Errands&) = delete;
 
     /// The cases and the profiles that there are.
     void list(State& state);

@@ -4,7 +4,6 @@
 #include <base/said.h>
 #include <base/user_files.h>
 #include <trainer/lists.h>
-#include <trainer/state.h>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -14,7 +13,6 @@
 #include <array>
 #include <ctime>
 #include <map>
-#include <optional>
 #include <string>
 #include <system_error>
 #include <tuple>

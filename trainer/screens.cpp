@@ -9,7 +9,6 @@
 #include <imgui_stdlib.h>
 
 #include <algorithm>
-#include <string>
 
 namespace palpate::trainer {
 
@@ -187,17 +186,14 @@ Errand drawDevices(State& state)
         words(tr("Begin with the grip in the middle of its reach, and hold it loosely. The first force comes up slowly."));
     } else {
         ImGui::Spacing();
-        words(
-            tr("With the mouse: hold the button of your index finger to take the tool; moving the mouse moves it in the "
-               "plane of the picture, "
-               "the wheel along itself: forward pushes it in. By keys: Enter takes it and lets it go, arrows move it, Page "
-               "down pushes it in. Let go, and the "
-               "force fades. Every key is listed by ? in the session."));
+        words(tr(
+            "With the mouse: hold the button of your index finger to take the tool; moving the mouse moves it in the plane "
+            "of the picture, the wheel along itself: forward pushes it in. By keys: Enter takes it and lets it go, arrows "
+            "move it, Page down pushes it in. Let go, and the force fades. Every key is listed by ? in the session."));
     }
     if (check.falconReady && state.gripReady) {
         words(tr("The buttons of the Falcon's grip work this window: forward presses what is marked, right and left mark "
-                 "the next "
-                 "and the one before, centre goes back."),
+                 "the next and the one before, centre goes back."),
               skyBlue);
     }
     ImGui::Spacing();

@@ -22,8 +22,6 @@ public:
     /// Throws std::runtime_error where there is no display with OpenGL 3.2.
     Stage(int width, int height);
     ~Stage();
-    Stage(const Stage&) = delete;
-    Stage& operator=(const Stage&) = delete;
 
     /// What draws.
     std::string renderer() const;

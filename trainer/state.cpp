@@ -9,7 +9,6 @@
 #include <array>
 #include <cassert>
 #include <tuple>
-#include <utility>
 
 namespace palpate::trainer {
 
@@ -63,13 +62,10 @@ std::vector<std::string> stepsOf(const State& state)
                                        : tr("Hold the centre button of the grip: you hold the needle. Push it in."));
         steps.front() += c.core ? " " + std::string(tr("The forward button fires.")) : "";
     } else {
-        steps.emplace_back(c.palpation
-                               ? tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                    "hold the fingertip. The wheel "
-                                    "forward, or Page down, presses.")
-                               : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                    "hold the needle. The wheel "
-                                    "forward, or Page down, pushes it in by 1 mm."));
+        steps.emplace_back(c.palpation ? tr("Hold the mouse button of your index finger in the picture, or press Enter: "
+                                            "you hold the fingertip. The wheel forward, or Page down, presses.")
+                                       : tr("Hold the mouse button of your index finger in the picture, or press Enter: "
+                                            "you hold the needle. The wheel forward, or Page down, pushes it in by 1 mm."));
         steps.front() += c.core ? " " + std::string(tr("Space fires.")) : "";
     }
     steps.insert(steps.end(), c.steps.begin(), c.steps.end());

@@ -9,9 +9,7 @@
 
 #include <algorithm>
 #include <deque>
-#include <string>
 #include <utility>
-#include <vector>
 
 namespace palpate::trainer {
 

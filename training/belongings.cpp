@@ -43,12 +43,6 @@ std::optional<std::string> operatorOf(const fs::path& file)
     }
 }
 
-// A record, or one that was being made.
-bool maybeRecord(const fs::path& file)
-{
-    return file.extension() == ".db" || file.extension() == ".part";
-}
-
 // A file, or a folder of pictures.
 void removeOne(const fs::path& file, Erased& erased)
 {
@@ -131,7 +125,9 @@ Erased removeBelongings(const Belongings& of)
     for (const fs::path& folder : of.folders) {
         std::error_code none;
         for (const auto& entry : fs::directory_iterator(folder, none)) {
-            if (maybeRecord(entry.path()) && !of.known.contains(fs::weakly_canonical(entry.path(), none))) {
+            const auto ending = entry.path().extension();  // of a record, or of one that was being made
+            const bool maybe = ending == ".db" || ending == ".part";
+            if (maybe && !of.known.contains(fs::weakly_canonical(entry.path(), none))) {
                 found.push_back(entry.path());
             }
         }

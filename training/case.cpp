@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <stdexcept>
 
@@ -181,16 +182,8 @@ bool isPng(const fs::path& file)
 
 const char* taskInWords(datasets::SessionTask task)
 {
-    switch (task) {
-        case datasets::SessionTask::find:
-            return "palpation";
-        case datasets::SessionTask::touch:
-            return "touch of the skin";
-        case datasets::SessionTask::advance:
-            return "way in without a core";
-        default:
-            return "biopsy";
-    }
+    constexpr std::array words{"biopsy", "palpation", "touch of the skin", "way in without a core"};
+    return words[static_cast<std::size_t>(task)];
 }
 
 // A volume alone has the standard biopsy on it.

@@ -3,18 +3,13 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
 
 namespace palpate::training {
 
-namespace {
-
 constexpr std::size_t maxStates = 2000;  // of a chain; finer values are merged beyond
-
-}  // namespace
 
 std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& failed)
 {

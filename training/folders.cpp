@@ -6,8 +6,6 @@
 
 #include <cstdlib>
 #include <set>
-#include <stdexcept>
-#include <string>
 
 namespace palpate::training {
 

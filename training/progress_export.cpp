@@ -1,6 +1,7 @@
 #include <training/progress_page.h>
 
 #include <base/outputs.h>
+#include <base/split.h>
 #include <haptics/measures.h>
 
 #include <fmt/format.h>
@@ -36,14 +37,7 @@ std::string cell(std::string text)
     if (!text.empty() && std::string_view("=+-@").find(text.front()) != std::string_view::npos) {
         text.insert(text.begin(), '\'');
     }
-    if (text.find_first_of(",\"\n\r") == std::string::npos) {
-        return text;
-    }
-    std::string out = "\"";
-    for (const char c : text) {
-        out += c == '"' ? "\"\"" : std::string(1, c);
-    }
-    return out + '"';
+    return base::csvCell(text);
 }
 
 // A UUID of version 5: the same name, the same id (RFC 4122, 4.3). The name space is that of URLs.

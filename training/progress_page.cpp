@@ -140,11 +140,6 @@ std::string signals(const ExerciseProgress& e)
     return words.empty() ? "none yet" : words;
 }
 
-std::string recentInWords(const GateState& gate)
-{
-    return gate.recentTried == 0 ? "-" : fmt::format("{} of last {}", gate.recentMet, gate.recentTried);
-}
-
 std::string overview(const CurriculumProgress& c)
 {
     const ExerciseProgress* const next = c.next();
@@ -155,12 +150,13 @@ std::string overview(const CurriculumProgress& c)
     int number = 0;
     for (const ExerciseProgress& e : c.exercises) {
         const auto [colour, words] = stateOf(e, next);
+        const std::string recent =
+            e.gate.recentTried == 0 ? "-" : fmt::format("{} of last {}", e.gate.recentMet, e.gate.recentTried);
         out += fmt::format(
             "<tr><th>{}. {}</th><td><b class=\"state\" style=\"color:var(--{})\">{}</b></td><td class=\"n\">{}</td><td "
             "class=\"n\">{} ({} of {})</td><td>{}</td><td>{}</td></tr>",
-            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recentInWords(e.gate),
-            e.exercise->gate.pass, e.exercise->gate.of, e.sessions.empty() ? "-" : signals(e),
-            e.daysSince ? days(*e.daysSince) : "never");
+            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recent, e.exercise->gate.pass,
+            e.exercise->gate.of, e.sessions.empty() ? "-" : signals(e), e.daysSince ? days(*e.daysSince) : "never");
     }
     return out + "</tbody></table></div><p class=\"note\">In brackets: what opens the gate.</p>";
 }
@@ -187,10 +183,8 @@ std::string assumptions(const CusumPlan& plan)
     };
     return fmt::format(
         "A session fails when it misses a level of its exercise. CUSUM with p0 = {:g}, p1 = {:g}, alpha = {:g}, beta = "
-        "{:g}: "
-        "who fails {:.0f} % of the time gets an alarm by chance every {} sessions in the mean, who fails {:.0f} % after "
-        "{}; "
-        "\"has learnt it\" comes after {} and, by chance, {} sessions.",
+        "{:g}: who fails {:.0f} % of the time gets an alarm by chance every {} sessions in the mean, who fails {:.0f} % "
+        "after {}; \"has learnt it\" comes after {} and, by chance, {} sessions.",
         plan.p0, plan.p1, plan.alpha, plan.beta, 100 * plan.p0, length(CusumChart::alarm, plan.p0), 100 * plan.p1,
         length(CusumChart::alarm, plan.p1), length(CusumChart::learning, plan.p0), length(CusumChart::learning, plan.p1));
 }
@@ -243,8 +237,8 @@ std::string freeCard(const PersonProgress& p)
     }
     std::string out =
         "<section class=\"card\"><h2>Free practice</h2><div class=\"scroll\"><table "
-        "class=\"plain\"><thead><tr><th>Case</th><th "
-        "class=\"n\">Sessions</th><th class=\"n\">Last total</th><th class=\"n\">Best total</th></tr></thead><tbody>";
+        "class=\"plain\"><thead><tr><th>Case</th><th class=\"n\">Sessions</th><th class=\"n\">Last total</th><th "
+        "class=\"n\">Best total</th></tr></thead><tbody>";
     for (const auto& [name, values] : totals) {
         out +=
             fmt::format("<tr><th>{}</th><td class=\"n\">{}</td><td class=\"n\">{:.0f}</td><td class=\"n\">{:.0f}</td></tr>",

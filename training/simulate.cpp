@@ -3,7 +3,6 @@
 #include <base/utc.h>
 
 #include <algorithm>
-#include <cmath>
 #include <ctime>
 #include <map>
 #include <random>

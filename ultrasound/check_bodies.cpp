@@ -3,7 +3,6 @@
 #include <base/cells.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace palpate::ultrasound {
 

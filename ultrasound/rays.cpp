@@ -9,8 +9,6 @@
 
 namespace palpate::ultrasound {
 
-namespace {
-
 constexpr float gelGap = 5e-3F;        // thicker gel has no contact [m]
 constexpr float lobe = 0.25F;          // of a mirror echo that the aperture still gets [rad]
 constexpr float shadowFill = 12e-6F;   // the square of a shadow edge's sigma grows by twice this a metre [m]
@@ -24,8 +22,6 @@ constexpr float degree = 57.29578F;
 // Between exact rest points, as the displacement is smooth:
 constexpr int stride = 8;      // steps along a line
 constexpr int lineStride = 4;  // lines
-
-}  // namespace
 
 float needleEcho(float degrees) noexcept
 {

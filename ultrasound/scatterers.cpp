@@ -7,7 +7,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 

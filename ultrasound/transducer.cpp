@@ -3,16 +3,11 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <cmath>
 
 namespace palpate::ultrasound {
 
-namespace {
-
 constexpr float perSigma = 2.3548F;  // width at half height of a Gaussian
 constexpr float pulse = 0.4413F;     // 2 ln 2 / pi
-
-}  // namespace
 
 Transducer linearProbe()
 {

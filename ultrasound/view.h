@@ -1,7 +1,6 @@
 #pragma once
 
 #include <channel/deformation.h>
-#include <channel/needle_shape.h>
 #include <ultrasound/medium.h>
 #include <ultrasound/transducer.h>
 

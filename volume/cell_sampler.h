@@ -188,7 +188,7 @@ private:
     template <typename Visit>
     void read(Index3 n, double weight, Vec3 place, const Visit& visit) const
     {
-        if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
+        if (base::holds(size_, n)) {
             const openvdb::Coord ijk(n.x, n.y, n.z);
             const std::uint16_t label = labelAt(ijk);
             if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>) {

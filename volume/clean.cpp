@@ -17,11 +17,6 @@ namespace {
 constexpr std::array<Index3, 6> faces{Index3(-1, 0, 0), Index3(1, 0, 0),  Index3(0, -1, 0),
                                       Index3(0, 1, 0),  Index3(0, 0, -1), Index3(0, 0, 1)};
 
-bool contains(const LabelImage& image, Index3 n)
-{
-    return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < image.size.x && n.y < image.size.y && n.z < image.size.z;
-}
-
 std::size_t countOf(const LabelImage& image)
 {
     return image.values.size();
@@ -47,7 +42,7 @@ void addFaces(const LabelImage& image, const RowRun& run, int y, int z, std::map
 {
     const std::uint16_t own = image.values[image.offset({run.first, y, z})];
     const auto look = [&](Index3 n) {
-        if (contains(image, n) && image.values[image.offset(n)] != own) {
+        if (base::holds(image.size, n) && image.values[image.offset(n)] != own) {
             ++seen[image.values[image.offset(n)]];
         }
     };
@@ -118,7 +113,7 @@ double findSurface(const LabelImage& image, const SkinLabels& labels, const std:
         const bool isSkin = labels.isSkin[image.values[at]] != 0;
         for (std::size_t f = 0; f < faces.size(); ++f) {
             const Index3 next = n + faces[f];
-            if (contains(image, next) && outside[image.offset(next)] != 0) {
+            if (base::holds(image.size, next) && outside[image.offset(next)] != 0) {
                 surface.values[at] = isSkin ? 2 : 1;
                 skin += isSkin ? area[static_cast<int>(f / 2)] : 0.0;
             }
@@ -147,7 +142,7 @@ public:
             high = glm::max(high, n);
             forEachIndex(Index3(-1), Index3(1), [&](Index3 step) {
                 const Index3 next = n + step;
-                if (contains(surface_, next) && surface_.values[surface_.offset(next)] == 1) {
+                if (base::holds(surface_.size, next) && surface_.values[surface_.offset(next)] == 1) {
                     surface_.values[surface_.offset(next)] = 0;
                     open.push_back(next);
                 }

@@ -22,8 +22,6 @@ class OutputFile {
 public:
     explicit OutputFile(const std::filesystem::path& file);
     ~OutputFile();
-    OutputFile(const OutputFile&) = delete;
-    OutputFile& operator=(const OutputFile&) = delete;
 
     /// What is written from now on is packed like this.
     void begin(Packing packing);

@@ -21,13 +21,6 @@ double Affine::voxelVolume() const noexcept
     return std::abs(glm::determinant(linear));
 }
 
-Index3 NodeGrid::node(std::size_t offset) const noexcept
-{
-    const auto nx = static_cast<std::size_t>(size.x);
-    const auto ny = static_cast<std::size_t>(size.y);
-    return {static_cast<int>(offset % nx), static_cast<int>(offset / nx % ny), static_cast<int>(offset / nx / ny)};
-}
-
 NodeGrid coveringGrid(const Box& box, double spacing, double margin)
 {
     const Vec3 low = glm::floor((box.low - margin) / spacing - 0.5) + 0.5;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/cells.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -55,26 +57,15 @@ struct NodeGrid {
     double spacing = 0;  // [m]
 
     /// How many nodes.
-    std::size_t count() const noexcept
-    {
-        return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
-    }
+    std::size_t count() const noexcept { return base::countOf(size); }
     /// Of a node in arrays over the grid.
-    std::size_t offset(Index3 n) const noexcept
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(size.x) +
-               static_cast<std::size_t>(n.x);
-    }
-    Index3 node(std::size_t offset) const noexcept;                                // the reverse of offset()
-    Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }  // of a node [m]
+    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
+    Index3 node(std::size_t offset) const noexcept { return base::cellOf(size, offset); }  // the reverse of offset()
+    Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }          // of a node [m]
     /// The lowest node of the cell that a place lies in, which may be outside of the grid.
-    Index3 cellOf(Vec3 at) const noexcept { return Index3(glm::floor((at - origin) / spacing)); }
+    Index3 cellAt(Vec3 at) const noexcept { return Index3(glm::floor((at - origin) / spacing)); }
     /// Whether there is such a node.
-    bool contains(Index3 n) const noexcept
-    {
-        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size.x && n.y < size.y && n.z < size.z;
-    }
+    bool contains(Index3 n) const noexcept { return base::holds(size, n); }
     /// From the first node to the last [m].
     Box box() const noexcept { return {origin, position(size - Index3(1))}; }
 };

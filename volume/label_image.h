@@ -17,12 +17,7 @@ struct LabelImage {
     std::vector<std::uint16_t> values;  // size.x * size.y * size.z
 
     /// Of a voxel in `values`.
-    std::size_t offset(Index3 n) const noexcept
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(size.x) +
-               static_cast<std::size_t>(n.x);
-    }
+    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
 };
 
 /// A name for one label value, and the tissue it is made of.

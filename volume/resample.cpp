@@ -22,11 +22,6 @@ constexpr double equal = 1e-9;     // shares that differ by less are the same
 constexpr double maxLoss = 0.1;    // of a structure's volume before it gets voxels back
 constexpr float minShare = 1e-4F;  // of a voxel that a structure can get back
 
-std::size_t countOf(Index3 size)
-{
-    return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
-}
-
 // The orthogonal matrix nearest to `m` (N. Higham, "Computing the Polar Decomposition", 1986); a mirrored one stays so.
 Mat3 nearestOrthogonal(Mat3 m)
 {
@@ -177,7 +172,7 @@ public:
         }
         out_.size = grid.size;
         out_.affine = grid.affine;
-        out_.values.assign(countOf(grid.size), 0);
+        out_.values.assign(base::countOf(grid.size), 0);
     }
 
     ResampledLabels run()
@@ -256,7 +251,7 @@ private:
             },
             [&](Index3 low, Index3 high, std::uint16_t label, Slab& slab) {
                 forEachIndex(low, high, [&](Index3 n) { out_.values[out_.offset(n)] = label; });
-                count(slab, label, static_cast<double>(countOf(high - low + 1)));
+                count(slab, label, static_cast<double>(base::countOf(high - low + 1)));
             });
         Totals filled(65536, 0.0);
         for (const Slab& slab : slabs) {
@@ -375,7 +370,7 @@ std::vector<float> resampledImage(const VoxelGrid& of, std::span<const float> va
     const Mat3 step = toIndex * grid.affine.linear;
     const Vec3 start = toIndex * (grid.affine.origin - of.affine.origin);
     const LabelImage places{grid.size, {}, {}}, from{of.size, {}, {}};
-    std::vector<float> out(countOf(grid.size), outside);
+    std::vector<float> out(base::countOf(grid.size), outside);
     tbb::parallel_for(0, grid.size.z, [&](int z) {
         forEachIndex(Index3(0, 0, z), Index3(grid.size.x - 1, grid.size.y - 1, z), [&](Index3 n) {
             const Vec3 at = start + step * Vec3(n);

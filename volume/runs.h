@@ -7,12 +7,12 @@
 // Inside volume/ only.
 namespace palpate::volume {
 
-/// Calls visit(value, first, last, y, z) for every run of equal values along x, both ends included, by z, then y, then x.
-/// Label maps are made of long ones.
+/// Calls visit(value, first, last, y, z) for every run of equal values along x in a slice, both ends included, by y, then
+/// x. Label maps are made of long ones.
 template <typename Visit>
-void forEachRunOf(const LabelImage& image, Visit&& visit)
+void forEachRunIn(const LabelImage& image, int z, Visit&& visit)
 {
-    const auto inRow = [&](int y, int z) {
+    for (int y = 0; y < image.size.y; ++y) {
         const std::uint16_t* row = image.values.data() + image.offset({0, y, z});
         for (int x = 0; x < image.size.x;) {
             const int first = x;
@@ -22,11 +22,15 @@ void forEachRunOf(const LabelImage& image, Visit&& visit)
             }
             visit(value, first, x - 1, y, z);
         }
-    };
+    }
+}
+
+/// The same for all slices in order.
+template <typename Visit>
+void forEachRunOf(const LabelImage& image, Visit&& visit)
+{
     for (int z = 0; z < image.size.z; ++z) {
-        for (int y = 0; y < image.size.y; ++y) {
-            inRow(y, z);
-        }
+        forEachRunIn(image, z, visit);
     }
 }
 

@@ -254,10 +254,7 @@ std::uint16_t Tissue::Reader::label(Vec3 p) const noexcept
 std::uint8_t Tissue::Reader::tissue(Vec3 p) const noexcept
 {
     openvdb::Coord ijk;
-    if (!impl_->voxel(p, ijk)) {
-        return 0;
-    }
-    return impl_->tissue.lookup.row[static_cast<std::uint16_t>(impl_->label.getValue(ijk))];
+    return !impl_->voxel(p, ijk) ? 0 : impl_->tissue.lookup.row[static_cast<std::uint16_t>(impl_->label.getValue(ijk))];
 }
 
 double Tissue::Reader::youngsModulus(Vec3 p) const noexcept
@@ -266,11 +263,7 @@ double Tissue::Reader::youngsModulus(Vec3 p) const noexcept
     return impl_->voxel(p, ijk) ? 1e3 * static_cast<double>(impl_->stiffness.getValue(ijk)) : 0.0;
 }
 
-namespace {
-
 constexpr std::array<std::string_view, 6> roleNames = {"plain", "skin", "tumour", "vital", "bone", "air"};
-
-}  // namespace
 
 std::string_view name(Role role) noexcept
 {

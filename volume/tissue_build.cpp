@@ -1,5 +1,6 @@
 #include <base/error.h>
 #include <volume/image_check.h>
+#include <volume/runs.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -41,22 +42,6 @@ struct Census {
     }
 };
 
-// Counts runs of equal values along x: label maps are made of long ones.
-void countSlice(const LabelImage& image, int z, Census& census)
-{
-    for (int y = 0; y < image.size.y; ++y) {
-        const std::uint16_t* row = image.values.data() + image.offset({0, y, z});
-        for (int x = 0; x < image.size.x;) {
-            const int start = x;
-            const std::uint16_t value = row[x];
-            while (x < image.size.x && row[x] == value) {
-                ++x;
-            }
-            census.add(value, {start, y, z}, {x - 1, y, z}, static_cast<std::uint64_t>(x - start));
-        }
-    }
-}
-
 Census takeCensus(const LabelImage& image)
 {
     const tbb::blocked_range<int> slices(0, image.size.z, 16);
@@ -64,7 +49,9 @@ Census takeCensus(const LabelImage& image)
         slices, Census{},
         [&](const tbb::blocked_range<int>& range, Census census) {
             for (int z = range.begin(); z != range.end(); ++z) {
-                countSlice(image, z, census);
+                forEachRunIn(image, z, [&](std::uint16_t value, int first, int last, int y, int) {
+                    census.add(value, {first, y, z}, {last, y, z}, static_cast<std::uint64_t>(last - first + 1));
+                });
             }
             return census;
         },

@@ -118,9 +118,7 @@ json toJson(const TissueRow& row)
 TissueRow rowFrom(const json& j)
 {
     const auto role = roleNamed(j.at("role").get<std::string>());
-    if (!role) {
-        throw base::error("unknown role '{}'", j.at("role").get<std::string>());
-    }
+    base::failIf(!role, "unknown role '{}'", j.at("role").get<std::string>());
     const json& colour = j.at("colour");
     TissueRow row;
     row.name = j.at("name").get<std::string>();

@@ -5,14 +5,10 @@
 
 namespace palpate::falcon {
 
-namespace {
-
 constexpr double betweenLooks = 5e-3;  // [s]
 
 constexpr std::array<std::pair<std::uint8_t, std::string_view>, 4> names{
     {{buttonRight, "right"}, {buttonForward, "forward"}, {buttonCentre, "centre"}, {buttonLeft, "left"}}};
-
-}  // namespace
 
 std::uint8_t Presses::take(std::uint8_t buttons, double now) noexcept
 {

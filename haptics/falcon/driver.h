@@ -29,8 +29,6 @@ public:
     Driver(std::unique_ptr<Transport> wire, DriverOptions options, Say say, const std::atomic<bool>& stop);
     /// Takes the torque off.
     ~Driver();
-    Driver(const Driver&) = delete;
-    Driver& operator=(const Driver&) = delete;
 
     /// The newest pose; `pose` as it was where none can be had at once. Servo thread: allocates nothing, never waits.
     void read(GripPose& pose) const noexcept { pose_.read(pose); }

@@ -15,6 +15,12 @@ struct ChartSeries {
     bool markers = true;                 // false: a line alone
     std::vector<std::string> label{};    // what each point is, for who points at it; empty, or as long as x
     std::vector<std::string> written{};  // text beside each point in the PNG; empty, or as long as x
+
+    void add(double atX, double atY)
+    {
+        x.push_back(atX);
+        y.push_back(atY);
+    }
 };
 
 /// A horizontal line, for a bound.

@@ -1,4 +1,5 @@
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
@@ -16,11 +17,7 @@ using nlohmann::json;
 
 json column(const std::vector<double>& values)
 {
-    json out = json::array();
-    for (const double v : values) {
-        out.push_back(std::isfinite(v) ? json(v) : json());
-    }
-    return out;
+    return base::mapped<json>(values, [&](const double v) { return std::isfinite(v) ? json(v) : json(); });
 }
 
 json axis(const std::string& label, bool log, AxisRange range)

@@ -81,8 +81,7 @@ void addPoint(report::Chart& chart, const json& entry, const View& view)
         series = chart.series.insert(chart.series.end(), report::ChartSeries{});
         series->name = name;
     }
-    series->x.push_back(entry.at("us_per_update"));
-    series->y.push_back(partOf(entry, view).at("near_pct"));
+    series->add(entry.at("us_per_update"), partOf(entry, view).at("near_pct"));
     series->label.push_back(entry.at("setting"));
     if (method == "elastic" || method == "elastic_finite") {
         const std::string& setting = series->label.back();
@@ -106,14 +105,11 @@ report::ChartSeries frontOf(const report::Chart& chart)
     report::ChartSeries front{"best within the time (Pareto front)", {}, {}, true, false};
     for (const std::size_t i : paretoFront(points)) {
         if (!front.y.empty()) {
-            front.x.push_back(points[i].seconds);
-            front.y.push_back(front.y.back());
+            front.add(points[i].seconds, front.y.back());
         }
-        front.x.push_back(points[i].seconds);
-        front.y.push_back(points[i].error);
+        front.add(points[i].seconds, points[i].error);
     }
-    front.x.push_back(longest);
-    front.y.push_back(front.y.empty() ? 0.0 : front.y.back());
+    front.add(longest, front.y.empty() ? 0.0 : front.y.back());
     return front;
 }
 

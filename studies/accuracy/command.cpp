@@ -5,6 +5,7 @@
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <session/open.h>
 #include <studies/accuracy/conforming.h>
@@ -217,11 +218,6 @@ std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, con
     return cases;
 }
 
-std::string caseName(const std::string& scene, const Baseline& method)
-{
-    return fmt::format("{}: {}{}{}", scene, method.method, method.setting.empty() ? "" : ", ", method.setting);
-}
-
 AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* const> references, const AccuracyArguments& o)
 {
     if (what.rival == nullptr) {
@@ -292,9 +288,8 @@ std::vector<Solved> solveAll(const AccuracyArguments& o, const std::vector<std::
 {
     std::vector<Solved> all;
     for (const std::string& what : subjects) {
-        if (std::ranges::find(all, shortName(what), &Solved::scene) != all.end()) {
-            throw base::error("{}: there is another scene called {} in this run: rename one", what, shortName(what));
-        }
+        base::failIf(std::ranges::find(all, shortName(what), &Solved::scene) != all.end(),
+                     "{}: there is another scene called {} in this run: rename one", what, shortName(what));
         all.push_back(solved(what, o, progress));
     }
     std::erase_if(all, [](const Solved& s) { return s.references.empty(); });
@@ -322,8 +317,9 @@ json runAll(const AccuracyArguments& o, const std::vector<std::string>& subjects
     for (std::size_t i = 0; i < all.size(); ++i) {
         const std::vector<Case> cases = casesOf(all[i], rivals, o);
         for (std::size_t m = 0; m < cases.size(); ++m) {
-            progress.show(fmt::format("scene {} of {}, method {} of {}: {}", i + 1, all.size(), m + 1, cases.size(),
-                                      caseName(all[i].scene, cases[m].method)));
+            const Baseline& b = cases[m].method;
+            progress.show(fmt::format("scene {} of {}, method {} of {}: {}: {}{}{}", i + 1, all.size(), m + 1, cases.size(),
+                                      all[i].scene, b.method, b.setting.empty() ? "" : ", ", b.setting));
             ran += runMissing(all[i], cases[m], o, log);
         }
         addScene(all[i], cases, log, figures);
@@ -419,9 +415,8 @@ void addAccuracy(CLI::App& app)
         "--references", o->references,
         "Folder of references, searched first, where new ones are stored (default: ~/.cache/palpate/references)");
     accuracy->add_option("--law", o->laws, "Material laws of the references")->delimiter(',')->capture_default_str();
-    accuracy->add_option("--limit", o->maxSeconds, "Maximum time of a method in one scene [s]; a slower method is left out")
-        ->check(CLI::Range(1.0, 1e6))
-        ->capture_default_str();
+    command::addNumber(*accuracy, "--limit", o->maxSeconds,
+                       "Maximum time of a method in one scene [s]; a slower method is left out", 1.0, 1e6);
     auto* rival = accuracy->add_option(
         "--rival", o->rivals,
         "External solver of the same push, as COMMAND or NAME=COMMAND; may be repeated (docs/accuracy.md)");
@@ -431,9 +426,8 @@ void addAccuracy(CLI::App& app)
         ->check(CLI::Range(1.0, 50.0))
         ->capture_default_str()
         ->needs(rival);
-    accuracy->add_option("--rival-limit", o->rivalSeconds, "Maximum time of a rival in one scene on one mesh [s]")
-        ->check(CLI::Range(1.0, 1e6))
-        ->capture_default_str();
+    command::addNumber(*accuracy, "--rival-limit", o->rivalSeconds, "Maximum time of a rival in one scene on one mesh [s]",
+                       1.0, 1e6);
     accuracy->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     accuracy->add_flag("--quick", o->quick, "Only few methods, scenes block and plate: a minute");
     auto* verify = accuracy->add_flag("--verify", o->verify, "No charts: compare kernel and reference with closed forms");
@@ -451,10 +445,7 @@ void addAccuracy(CLI::App& app)
         ->delimiter(',')
         ->capture_default_str()
         ->needs(depth);
-    accuracy->add_option("--speed", o->speed, "With --depth: speed of the tool [mm/s]")
-        ->check(CLI::Range(1.0, 1000.0))
-        ->capture_default_str()
-        ->needs(depth);
+    command::addNumber(*accuracy, "--speed", o->speed, "With --depth: speed of the tool [mm/s]", 1.0, 1000.0)->needs(depth);
     accuracy->final_callback([o] { accuracyCommand(*o); });
 }
 

@@ -80,10 +80,8 @@ report::Chart chartOf(const json& figures, const std::string& what, const Panel&
         worst.name = setting + ", worst place";
         middle.line = worst.line = true;
         for (const auto& [radii, errors] : errorsOf(figures, what, setting, panel)) {
-            middle.x.push_back(radii);
-            middle.y.push_back(median(errors));
-            worst.x.push_back(radii);
-            worst.y.push_back(std::ranges::max(errors));
+            middle.add(radii, median(errors));
+            worst.add(radii, std::ranges::max(errors));
         }
         if (!middle.x.empty()) {
             chart.series.push_back(std::move(middle));
@@ -101,8 +99,7 @@ std::string csvOf(const json& figures)
 {
     std::string out =
         "scene,tool,setting,way,place_x,place_z,depth_mm,fx_n,fy_n,fz_n,reference_x_n,reference_y_n,reference_z_n,error_"
-        "pct,"
-        "direction_deg\n";
+        "pct,direction_deg\n";
     for (const json& e : figures.at("depth")) {
         out += fmt::format("{},{},{},{}", e.at("scene").get<std::string>(), e.at("tool").get<std::string>(),
                            e.at("setting").get<std::string>(), e.at("way").get<std::string>());
@@ -359,11 +356,9 @@ void deepCommand(const DeepCommand& c)
     }
     command::writeJson(c.json, figures);
     for (const json& s : figures.at("summary")) {
-        if (s.at("pull_n").get<double>() > 0.0) {
-            throw base::error("{}, {}, {}: the tissue pulls the tool inwards by {:.2g} N", s.at("scene").get<std::string>(),
-                              s.at("tool").get<std::string>(), s.at("setting").get<std::string>(),
-                              s.at("pull_n").get<double>());
-        }
+        base::failIf(s.at("pull_n").get<double>() > 0.0, "{}, {}, {}: the tissue pulls the tool inwards by {:.2g} N",
+                     s.at("scene").get<std::string>(), s.at("tool").get<std::string>(), s.at("setting").get<std::string>(),
+                     s.at("pull_n").get<double>());
     }
 }
 

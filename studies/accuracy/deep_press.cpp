@@ -46,10 +46,8 @@ public:
     std::size_t word(std::size_t column, std::initializer_list<std::string_view> words) const
     {
         const auto* const found = std::ranges::find(words, cells_[column]);
-        if (found == words.end()) {
-            throw base::error("{}: {} = '{}': must be {}", where_, columns[column], cells_[column],
-                              fmt::join(words, " or "));
-        }
+        base::failIf(found == words.end(), "{}: {} = '{}': must be {}", where_, columns[column], cells_[column],
+                     fmt::join(words, " or "));
         return static_cast<std::size_t>(found - words.begin());
     }
 
@@ -57,10 +55,8 @@ public:
     {
         const std::string_view cell = cells_[column];
         const std::optional<double> value = base::numberIn(cell);
-        if (!value || !(*value >= least && *value <= most)) {
-            throw base::error("{}: {} = '{}': must be a number from {:g} to {:g}", where_, columns[column], cell, least,
-                              most);
-        }
+        base::failIf(!value || !(*value >= least && *value <= most), "{}: {} = '{}': must be a number from {:g} to {:g}",
+                     where_, columns[column], cell, least, most);
         return *value;
     }
 
@@ -270,10 +266,7 @@ DeepZone zoneOf(double depth, double radius, double spacing) noexcept
     if (radii > most + rounding) {
         return DeepZone::deepest;
     }
-    if (radii > 1.0 + rounding) {
-        return DeepZone::deep;
-    }
-    return cells <= most ? DeepZone::touch : DeepZone::middle;
+    return radii > 1.0 + rounding ? DeepZone::deep : cells <= most ? DeepZone::touch : DeepZone::middle;
 }
 
 DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, const datasets::ElasticSettings& settings,

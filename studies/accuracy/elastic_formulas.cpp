@@ -65,11 +65,7 @@ double thinLayerPunchFactor(double poisson, double fraction) noexcept
     return known && std::abs(poisson - 0.45) < 1e-9 ? stiff[at] : 0.0;
 }
 
-namespace {
-
 constexpr double pi = std::numbers::pi;
-
-}  // namespace
 
 Vec3 inclusionDisplacement(const Inclusion& inclusion, Vec3 x)
 {

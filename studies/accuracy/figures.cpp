@@ -2,6 +2,7 @@
 
 #include <base/error.h>
 #include <base/mapped.h>
+#include <base/split.h>
 #include <studies/kernel/figures.h>
 
 #include <fmt/format.h>
@@ -61,11 +62,6 @@ bool competes(const json& entry)
     return method != "nothing" && method != "spring" && entry.contains("near_pct");
 }
 
-bool ours(const json& entry)
-{
-    return entry.at("method").get<std::string>().starts_with("elastic");
-}
-
 // Entries of each scene and law, in the order in which they come.
 std::vector<std::vector<json*>> groups(json& chart)
 {
@@ -101,7 +97,8 @@ void printBeaten(const std::vector<json*>& group)
 {
     for (const json* e : group) {
         const double time = numberAt(*e, "us_per_update"), error = numberAt(*e, "near_pct");
-        if (!ours(*e) || !competes(*e) || e->at("on_front").get<bool>() || time < shortest || time > longest) {
+        const bool ours = e->at("method").get<std::string>().starts_with("elastic");
+        if (!ours || !competes(*e) || e->at("on_front").get<bool>() || time < shortest || time > longest) {
             continue;
         }
         const json* by = nullptr;
@@ -142,14 +139,7 @@ std::string csvCell(const json& entry, const std::string& key)
     if (found == from.end() || found->is_null()) {
         return "";
     }
-    if (!found->is_string()) {
-        return found->dump();
-    }
-    std::string quoted = found->get<std::string>();
-    for (std::size_t at = 0; (at = quoted.find('"', at)) != std::string::npos; at += 2) {
-        quoted.insert(at, 1, '"');
-    }
-    return "\"" + quoted + "\"";
+    return found->is_string() ? base::csvQuoted(found->get<std::string>()) : found->dump();
 }
 
 }  // namespace

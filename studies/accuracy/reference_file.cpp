@@ -1,6 +1,7 @@
 #include <studies/accuracy/reference_file.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <volume/fnv.h>
 
@@ -13,7 +14,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <type_traits>
@@ -269,10 +269,7 @@ void addTissue(volume::Fnv& hash, const volume::Tissue& tissue, double poissonCa
 
 void saveReference(const std::filesystem::path& file, const Reference& reference, const ReferenceInfo& info)
 {
-    json states = json::array();
-    for (const ReferenceState& s : reference.states) {
-        states.push_back(stateJson(s));
-    }
+    json states = base::mapped<json>(reference.states, stateJson);
     const json out{{"palpate_reference", format},        {"info", infoJson(info)},
                    {"count", reference.position.size()}, {"position", positionJson(reference.position)},
                    {"states", std::move(states)},        {"nodes", reference.nodes},

@@ -110,10 +110,8 @@ void solve(const std::string& what, const AccuracySubject& subject, const std::s
     const fs::path folder = file.parent_path();
     std::error_code failed;
     fs::create_directories(folder, failed);
-    if (failed) {
-        throw base::error("{}: cannot be made ({}): name another folder with --references", folder.string(),
-                          failed.message());
-    }
+    base::failIf(static_cast<bool>(failed), "{}: cannot be made ({}): name another folder with --references",
+                 folder.native(), failed.message());
     std::vector<std::string> arguments{
         what,     "--law",      law, "--tool", subject.path.tool.name, "--speed", fmt::format("{:g}", 1e3 * subject.speed),
         "--save", file.string()};

@@ -13,7 +13,6 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -135,9 +134,7 @@ std::size_t readTable(const std::filesystem::path& file, std::string_view head, 
 
 void checkRows(const std::filesystem::path& file, std::size_t rows, std::size_t wanted, const std::string& ofWhat)
 {
-    if (rows != wanted) {
-        throw base::error("{}: {} rows: must be {}, {}", file.filename().string(), rows, wanted, ofWhat);
-    }
+    base::failIf(rows != wanted, "{}: {} rows: must be {}, {}", file.filename().string(), rows, wanted, ofWhat);
 }
 
 }  // namespace
@@ -197,14 +194,10 @@ RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t loo
     checkRows(forces, forceRows, looks, "one per look");
     const auto times = folder / "times.csv";
     readTable(times, "processor_s", maxTimes, [&](std::span<const double> v) {
-        if (v[0] <= 0.0) {
-            throw base::error("{}: {:g} s: must be over 0", times.filename().string(), v[0]);
-        }
+        base::failIf(v[0] <= 0.0, "{}: {:g} s: must be over 0", times.filename().string(), v[0]);
         out.seconds.push_back(v[0]);
     });
-    if (out.seconds.empty()) {
-        throw std::runtime_error(times.filename().string() + ": no rows: must be one per update in contact");
-    }
+    base::failIf(out.seconds.empty(), "{}: no rows: must be one per update in contact", times.filename().string());
     return out;
 }
 

@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <studies/accuracy/deep.h>
 
 #include <base/error.h>
@@ -78,10 +79,7 @@ void printForms(const json& rows)
 void verifyCommand(bool quick, const std::filesystem::path& file)
 {
     command::Progress progress;
-    json rows = json::array();
-    for (const auto& v : verifyKernel(quick, [&](const std::string& what) { progress.show(what); })) {
-        rows.push_back(rowOf(v));
-    }
+    json rows = base::mapped<json>(verifyKernel(quick, [&](const std::string& what) { progress.show(what); }), rowOf);
     const bool both = !referenceProgram().empty();
     std::string missing = both ? "" : "palpate-reference was not built (-DPALPATE_REFERENCE=ON): its rows are missing";
     try {
@@ -103,9 +101,7 @@ void verifyCommand(bool quick, const std::filesystem::path& file)
     for (const json& row : rows) {
         over += row["holds"].get<bool>() ? 0 : 1;
     }
-    if (both && !missing.empty()) {
-        throw std::runtime_error(missing);
-    }
+    base::failIf(both && !missing.empty(), "{}", missing);
     base::failIf(over > 0, "{} of {} rows are over their bounds: see the table", over, rows.size());
 }
 

@@ -176,8 +176,7 @@ public:
             series_.push_back({name, {}, {}, line});
             found = series_.end() - 1;
         }
-        found->x.push_back(microseconds);
-        found->y.push_back(error);
+        found->add(microseconds, error);
     }
     std::vector<report::ChartSeries> take() { return std::move(series_); }
 
@@ -254,10 +253,8 @@ double singleGridRatio(const KernelCase& c, double TrialErrors::*figure)
 nlohmann::json kernelFigures(const std::vector<KernelCase>& cases, const OperatorBench& operators,
                              const std::string& headline)
 {
-    auto list = nlohmann::json::array();
-    for (const KernelCase& c : cases) {
-        list.push_back(caseFigures(c, operators.sets.back().rates));
-    }
+    nlohmann::json list = base::mapped<nlohmann::json>(
+        cases, [&](const KernelCase& c) { return caseFigures(c, operators.sets.back().rates); });
     const int window = datasets::elasticSetting("default").window;
     const std::string& widest = operators.sets.back().name;
     const OperatorCase& best = caseOf(operators, widest, false, window);

@@ -11,12 +11,10 @@
 #include <time.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <numeric>
-#include <optional>
 #include <utility>
 
 namespace palpate::studies {
@@ -192,11 +190,7 @@ TrialErrors look(const TrialModel& model, const Reference& reference, const Posi
                  const ElasticResult& result)
 {
     const ReferenceState& state = stateAt(reference, t.pose);
-    std::vector<Vec3> u;
-    u.reserve(reference.position.size());
-    for (const Vec3f& p : reference.position) {
-        u.push_back(model.displacement(Vec3(p)));
-    }
+    auto u = base::mapped<Vec3>(reference.position, [&](const Vec3f& p) { return model.displacement(Vec3(p)); });
     const auto force = model.force ? std::optional(model.force()) : std::nullopt;
     TrialErrors errors = errorsOf(u, force, reference, cells, state);
     errors.phase = t.phase;

@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <studies/commands.h>
 
 #include <base/outputs.h>
@@ -47,8 +48,7 @@ report::ChartSeries seriesOf(const NeedleCurve& curve, std::size_t last)
     double before = -1.0;
     for (std::size_t i = 0; i < last; ++i) {
         if (std::abs(curve.depth[i] - before) >= chartStep || i + 1 == last) {
-            s.x.push_back(1e3 * curve.depth[i]);
-            s.y.push_back(curve.force[i]);
+            s.add(1e3 * curve.depth[i], curve.force[i]);
             before = curve.depth[i];
         }
     }
@@ -79,10 +79,9 @@ report::Chart layeredChart(const LayeredNeedle& layered)
     chart.series.push_back(boundarySeries(layered.boundaries, 1.1 * top));
     chart.note =
         "Palpate's way out lies below zero: the shaft is held. A boundary is felt deeper than it lies at rest, as the "
-        "needle "
-        "pushes the tissue ahead of it. The layers of the thesis, with 300 N/m each, are removed one after another, each "
-        "for "
-        "good: the gland behind the tumour went with that before it, and on the way out the last layer's force goes on.";
+        "needle pushes the tissue ahead of it. The layers of the thesis, with 300 N/m each, are removed one after another, "
+        "each for good: the gland behind the tumour went with that before it, and on the way out the last layer's force "
+        "goes on.";
     return chart;
 }
 
@@ -95,8 +94,7 @@ report::Chart liverChart(const std::vector<LiverNeedle>& liver)
     const auto add = [&](const char* name, double from, double to, auto force) {
         report::ChartSeries s{name, {}, {}, true, false};
         for (double z = from; z <= to; z += 1e-3) {
-            s.x.push_back(1e3 * z);
-            s.y.push_back(force(z));
+            s.add(1e3 * z, force(z));
         }
         chart.series.push_back(std::move(s));
     };
@@ -120,8 +118,7 @@ report::Chart onsetChart(const Onset& onset)
     const auto add = [&](const char* name, double OnsetPoint::*value) {
         report::ChartSeries s{name, {}, {}, true};
         for (const auto& p : onset.points) {
-            s.x.push_back(1e3 * p.pressed);
-            s.y.push_back(1e3 * (p.*value));
+            s.add(1e3 * p.pressed, 1e3 * (p.*value));
         }
         chart.series.push_back(std::move(s));
     };
@@ -144,10 +141,7 @@ json boundariesEntry(const std::vector<NeedleBoundary>& boundaries)
 
 json curveEntry(const NeedleCurve& c)
 {
-    json falls = json::array();
-    for (const double depth : fallsOf(c, minFall)) {
-        falls.push_back(1e3 * depth);
-    }
+    json falls = base::mapped<json>(fallsOf(c, minFall), [&](const double depth) { return 1e3 * depth; });
     const auto turn = c.force.begin() + static_cast<std::ptrdiff_t>(c.turn);
     return {{"name", c.name},
             {"punctures", boundariesEntry(c.punctures)},

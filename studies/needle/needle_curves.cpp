@@ -231,8 +231,7 @@ haptics::SessionModel besideVessel()
         "[[vital]]\nname = \"artery\"\nwarn_mm = 19\n"
         "[target]\nstructure = \"base\"\nentry_mm = [2, 0, 0]\naim_mm = [2, 62, 0]\n",
         "onset.toml");
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    return haptics::buildModel(std::move(scene), std::move(tissue));
+    return haptics::buildModel(std::move(scene));
 }
 
 double onsetOf(const Onset& onset, double OnsetPoint::*distance)

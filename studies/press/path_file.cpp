@@ -65,9 +65,8 @@ public:
 
     void require(const std::string& name) const
     {
-        if (!has(static_cast<std::size_t>(std::ranges::find(known_, name) - known_.begin()))) {
-            throw base::error("{}: column {} is missing: the columns are {}", where(), name, fmt::join(known_, ", "));
-        }
+        base::failIf(!has(static_cast<std::size_t>(std::ranges::find(known_, name) - known_.begin())),
+                     "{}: column {} is missing: the columns are {}", where(), name, fmt::join(known_, ", "));
     }
 
     bool nextRow()
@@ -125,14 +124,10 @@ private:
             name = name.substr(1, name.size() - 2);
         }
         const auto at = std::ranges::find(known_, name);
-        if (at == known_.end()) {
-            throw base::error("{}: column '{}' is not known: the columns are {}", where(), cellInWords(name),
-                              fmt::join(known_, ", "));
-        }
+        base::failIf(at == known_.end(), "{}: column '{}' is not known: the columns are {}", where(), cellInWords(name),
+                     fmt::join(known_, ", "));
         auto& place = place_[static_cast<std::size_t>(at - known_.begin())];
-        if (place) {
-            throw base::error("{}: column {} is there twice", where(), name);
-        }
+        base::failIf(place.has_value(), "{}: column {} is there twice", where(), name);
         place = count_++;
     }
 

@@ -16,12 +16,8 @@ namespace palpate::studies {
 
 using datasets::ToolKind;
 
-namespace {
-
 constexpr double insertedStep = 0.1e-3;  // to which it is known how much of it is in the body [m]
 constexpr double touchStep = 0.25e-3;    // at most so deep a tool is found that comes to the surface [m]
-
-}  // namespace
 
 std::optional<Vec3> plannedAxis(const haptics::SessionModel& model) noexcept
 {

@@ -16,8 +16,7 @@ std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::
     image.size = Index3(glm::round(high - low));
     image.affine.linear = Mat3(metres);
     image.affine.origin = metres * (low + 0.5);
-    image.values.resize(static_cast<std::size_t>(image.size.x) * static_cast<std::size_t>(image.size.y) *
-                        static_cast<std::size_t>(image.size.z));
+    image.values.resize(base::countOf(image.size));
     std::array<bool, bodyTumour + 1> there{};
     volume::forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
         const BodyLabel at = label(low + Vec3(n) + 0.5);

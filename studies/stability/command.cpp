@@ -1,4 +1,5 @@
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -36,8 +37,7 @@ haptics::SessionModel modelIn(const StabilityScene& scene, const std::string& de
     session.device = device;
     session.source.file = volume;
     auto parsed = datasets::parseScene(datasets::sceneText(session), volume);
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(parsed));
-    return haptics::buildModel(std::move(parsed), std::move(tissue));
+    return haptics::buildModel(std::move(parsed));
 }
 
 // Where the volume of a record goes.
@@ -83,9 +83,7 @@ CellResult recordCell(const Cell& cell, const StabilityModels& models, const std
                                        }
                                    });
     recorder.finish({});
-    if (!recorder.error().empty()) {
-        throw base::error("{}: {}", file.string(), recorder.error());
-    }
+    base::failIf(!recorder.error().empty(), "{}: {}", file.native(), recorder.error());
     const Bounded bounded = cell.held ? scene.held : scene.released;
     return {cell, bounded, figureOf(bounded.figure, trace, scene)};
 }
@@ -113,11 +111,7 @@ json runCells(const StabilityArguments& o, StabilityModels& models, command::Pro
     onThreads(
         cells.size(), o.jobs, [&](std::size_t i) { results[i] = runCell(cells[i], models); },
         [&](std::size_t done) { progress.show(fmt::format("{} of {} cells", done, cells.size())); });
-    json out = json::array();
-    for (const CellResult& r : results) {
-        out.push_back(cellEntry(r));
-    }
-    return out;
+    return base::mapped<json>(results, cellEntry);
 }
 
 json runFuzz(const StabilityArguments& o, StabilityModels& models, command::Progress& progress)
@@ -149,10 +143,8 @@ void checkCells(const json& cells, const StabilityModels& models)
 void checkFuzz(const json& fuzzed)
 {
     for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite", "pulled"}) {
-        if (fuzzed.at(key) != 0) {
-            throw base::error("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
-                              fuzzed.at(key).dump());
-        }
+        base::failIf(fuzzed.at(key) != 0, "hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
+                     fuzzed.at(key).dump());
     }
 }
 
@@ -244,9 +236,8 @@ void addStability(CLI::App& app)
         one->excludes(c->get_option(ofMatrix));
     }
     c->add_option("--record", o->record, "With --case: record it as a session (.db), its volume beside it (.vdb)");
-    c->add_option("--jobs", o->jobs, "Number of threads (default: all cores); the figures do not depend on it")
-        ->check(CLI::Range(1, 1024))
-        ->capture_default_str();
+    command::addNumber(*c, "--jobs", o->jobs, "Number of threads (default: all cores); the figures do not depend on it", 1,
+                       1024);
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o, rates] {
         if (o->choice.quick && rates->count() == 0) {

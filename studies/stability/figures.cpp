@@ -2,7 +2,6 @@
 
 #include <base/outputs.h>
 #include <command/json.h>
-#include <report/chart/chart.h>
 #include <report/html.h>
 #include <studies/stability/theory.h>
 
@@ -189,8 +188,7 @@ std::optional<report::Chart> chartOfView(const json& figures, const StabilityVie
             const auto x = numberIn(cell.at("scene"), view);
             if (x && cell.at("method") == method && cell.at("device") == "premium" && cell.at("grip") == "grip" &&
                 cell.at("rate_hz") == 1000 && cell.at("figure").is_number()) {
-                series.x.push_back(*x);
-                series.y.push_back(std::max(cell.at("figure").get<double>(), 1e-6));
+                series.add(*x, std::max(cell.at("figure").get<double>(), 1e-6));
                 chart.bounds = {{fmt::format("bound: {:g}", cell.at("bound").get<double>()), cell.at("bound")}};
             }
         }
@@ -285,8 +283,7 @@ std::vector<report::Chart> limitCharts(const json& figures)
             charts.push_back(std::move(chart));
         }
         for (report::ChartSeries& series : charts.back().series) {
-            series.x.push_back(point.at("x"));
-            series.y.push_back(point.at(series.line ? "predicted_n_m" : "simulated_n_m"));
+            series.add(point.at("x"), point.at(series.line ? "predicted_n_m" : "simulated_n_m"));
         }
     }
     return charts;

@@ -1,6 +1,7 @@
 #include <studies/stability/matrix.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/split.h>
 
 #include <fmt/format.h>
@@ -46,8 +47,7 @@ const T& named(const std::vector<T>& all, const std::string& name, const char* w
 {
     const auto found = std::ranges::find(all, name, &T::name);
     if (found == all.end()) {
-        std::vector<std::string> names;
-        std::ranges::transform(all, std::back_inserter(names), &T::name);
+        const auto names = base::mapped<std::string>(all, &T::name);
         throw base::error("{}: there is no such {}; there are {}", name, what, fmt::join(names, ", "));
     }
     return *found;
@@ -166,8 +166,7 @@ void StabilityModels::prepare(const std::vector<Cell>& cells)
 
 std::vector<Cell> matrixCells(const StabilityModels& models, const MatrixChoice& choice)
 {
-    std::vector<std::string> methodNames;
-    std::ranges::transform(models.methods(), std::back_inserter(methodNames), &StabilityMethod::name);
+    const auto methodNames = base::mapped<std::string>(models.methods(), &StabilityMethod::name);
     auto devices = chosen(haptics::deviceNames(), choice.devices, "devices");
     if (choice.quick && choice.devices.empty()) {
         devices.resize(1);
@@ -197,11 +196,9 @@ Cell cellOf(const StabilityModels& models, const std::string& id)
                  "--case {}: is no cell: give SCENE/METHOD/DEVICE/grip or released/RATE, such as "
                  "plate-1mm/elastic/premium/grip/1000",
                  id);
-    if (models.scene(parts[0]).pierced && !models.method(parts[1]).pierces) {
-        throw base::error(
-            "--case {}: the needle pierces tissue in this scene, and {} does not support that: choose another method", id,
-            parts[1]);
-    }
+    base::failIf(models.scene(parts[0]).pierced && !models.method(parts[1]).pierces,
+                 "--case {}: the needle pierces tissue in this scene, and {} does not support that: choose another method",
+                 id, parts[1]);
     haptics::deviceParameters(parts[2]);
     return {parts[0], parts[1], parts[2], parts[3] == "grip", rate};
 }

@@ -1,7 +1,6 @@
 #include <studies/stability/method.h>
 
 #include <haptics/contact_law.h>
-#include <haptics/simulation.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>

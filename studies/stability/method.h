@@ -5,9 +5,7 @@
 #include <studies/stability/scene.h>
 
 #include <functional>
-#include <memory>
 #include <string>
-#include <string_view>
 
 namespace palpate::studies {
 

@@ -116,8 +116,7 @@ TasksCase measure(const ThesisArguments& o, std::size_t objects, std::string& gr
     const auto start = Clock::now();
     auto model = haptics::buildModel(scene, inclusionTissue(spec));
     result.build = std::chrono::duration<double>(Clock::now() - start).count();
-    const auto size = model.tissue->size();
-    result.voxels = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    result.voxels = base::countOf(model.tissue->size());
     result.events = timeEvents(model, eventsWith(taskEvents, false), nullptr, options);
     if (graphics.empty()) {
         graphics = timeGraphics(model, options, result);
@@ -188,19 +187,11 @@ void addBenchTasks(CLI::App& bench)
                   "Numbers of objects, three or more (default: 25 to 600 as in Table 2 of the thesis, and on to 10^6)")
         ->delimiter(',')
         ->check(CLI::Range(1, 8'000'000));
-    c->add_option("--voxels", o->voxels,
-                  "Voxels along a side of the block (0: as few as separate the objects, at least 64)")
-        ->check(CLI::Range(0, 800))
-        ->capture_default_str();
-    c->add_option("--model", o->level, "Level of the tissue model")
-        ->check(CLI::IsMember(datasets::modelLevels))
-        ->capture_default_str();
-    c->add_option("--setting", o->setting, "Resolution of level elastic")
-        ->check(CLI::IsMember(datasets::elasticSettings()))
-        ->capture_default_str();
-    c->add_option("--frames", o->frames, "Frames of 33 ticks, for each event and number of objects")
-        ->check(CLI::Range(1, 1000))
-        ->capture_default_str();
+    command::addNumber(*c, "--voxels", o->voxels,
+                       "Voxels along a side of the block (0: as few as separate the objects, at least 64)", 0, 800);
+    command::addChoice(*c, "--model", o->level, "Level of the tissue model", datasets::modelLevels);
+    command::addChoice(*c, "--setting", o->setting, "Resolution of level elastic", datasets::elasticSettings());
+    command::addNumber(*c, "--frames", o->frames, "Frames of 33 ticks, for each event and number of objects", 1, 1000);
     c->add_option("--seed", o->seed, "Seed of the objects' positions and of the order of measurement")
         ->capture_default_str()
         ->check(command::seedFault, "a whole number");

@@ -299,8 +299,7 @@ report::ChartSeries timesOf(const json& events, const char* event, std::string n
     report::ChartSeries s{std::move(name), {}, {}, true};
     for (const auto& e : events) {
         if (e["event"] == event) {
-            s.x.push_back(e["objects"]);
-            s.y.push_back(e["process_us"]);
+            s.add(e["objects"], e["process_us"]);
         }
     }
     return s;
@@ -315,8 +314,8 @@ report::ChartSeries thesisBeyond(const json& figures, double most)
     constexpr int points = 20;
     for (int i = 0; i <= points; ++i) {
         const auto from = static_cast<double>(table2Most);
-        s.x.push_back(from * std::pow(most / from, static_cast<double>(i) / points));
-        s.y.push_back(fit["intercept_us"].get<double>() + slope.get<double>() * s.x.back());
+        const double objects = from * std::pow(most / from, static_cast<double>(i) / points);
+        s.add(objects, fit["intercept_us"].get<double>() + slope.get<double>() * objects);
     }
     return s;
 }
@@ -355,8 +354,7 @@ report::Chart tasksChartOf(const json& f)
         report::ChartSeries s{std::string(task), {}, {}, true};
         for (const auto& e : f["events"]) {
             if (e["event"] == "A8") {
-                s.x.push_back(e["objects"]);
-                s.y.push_back(e["tasks_us"][std::string(task)]);
+                s.add(e["objects"], e["tasks_us"][std::string(task)]);
             }
         }
         chart.series.push_back(std::move(s));

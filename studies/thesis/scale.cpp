@@ -2,6 +2,7 @@
 
 #include <base/outputs.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <session/figures.h>
 #include <studies/thesis/tasks_measure.h>
@@ -93,9 +94,8 @@ Measured measure(const InclusionSpec& spec, const datasets::ModelSettings& setti
     auto model = haptics::buildModel(inclusionScene(settings), inclusionTissue(spec));
     Measured m;
     m.build = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const auto size = model.tissue->size();
     m.objects = spec.inclusions;
-    m.voxels = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    m.voxels = base::countOf(model.tissue->size());
     m.nodes = activeNodes(model);
     const auto a8 = *std::ranges::find(taskEvents, "A8", &TaskEvent::name);
     const auto times = timeEvents(model, std::span(&a8, 1), nullptr, {frames});
@@ -309,12 +309,8 @@ void addBenchScale(CLI::App& bench)
     auto* c = bench.add_subcommand("scale",
                                    "Find the largest scene (objects, voxels, active nodes) that runs at 1 kHz with a "
                                    "haptic part under 0.08 ms and under 0.5 ms, and what limits it");
-    c->add_option("--memory-gb", o->memoryGb, "Maximum memory of a scene [GB]")
-        ->check(CLI::Range(0.1, 1000.0))
-        ->capture_default_str();
-    c->add_option("--frames", o->frames, "Frames of 33 ticks, for each scene")
-        ->check(CLI::Range(1, 1000))
-        ->capture_default_str();
+    command::addNumber(*c, "--memory-gb", o->memoryGb, "Maximum memory of a scene [GB]", 0.1, 1000.0);
+    command::addNumber(*c, "--frames", o->frames, "Frames of 33 ticks, for each scene", 1, 1000);
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o] { benchScale(*o); });
 }

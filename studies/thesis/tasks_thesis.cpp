@@ -59,44 +59,35 @@ constexpr double none = -1.0;  // not in the table
 
 struct Column {
     std::string_view event;
-    std::array<double, thesisObjects.size()> load;        // Table 2 [0.1 ms]
-    double slope, slopeError, intercept, interceptError;  // Table 4 [0.1 ms]
+    std::array<double, thesisObjects.size()> load;  // Table 2 [0.1 ms]
+    struct {
+        double slope, slopeError, intercept, interceptError;
+    } line;  // Table 4 [0.1 ms]
 };
 
 constexpr std::array<Column, 8> thesisColumns{
     {{"A1",
       {1.6, 1.9, 2.125, 2.4, 2.9, 3.35, 3.8, 4.25, 4.8, 5.35, 5.9, 6.55, 6.9, 7.4},
-      0.01009,
-      1.00431e-4,
-      1.34746,
-      0.03428},
+      {0.01009, 1.00431e-4, 1.34746, 0.03428}},
      {"A2",
       {1.5, 1.8, 2.025, 2.3, 2.8, 3.25, 3.7, 4.0, 4.6, 5.15, 5.65, 6.3, 6.675, 7.2},
-      0.0098,
-      1.20632e-4,
-      1.2676,
-      0.04118},
+      {0.0098, 1.20632e-4, 1.2676, 0.04118}},
      {"A3",
       {1.2, 1.4, 1.7, 1.9, 2.4, 2.85, 3.3, 3.8, 4.3, 4.75, 5.4, 6.0, 6.45, 6.9},
-      0.00999,
-      1.07684e-4,
-      0.88569,
-      0.03676},
+      {0.00999, 1.07684e-4, 0.88569, 0.03676}},
      {"A4",
       {1.05, 1.3, 1.6, 1.8, 2.3, 2.8, 3.2, 3.7, 4.2, 4.7, 5.2, 5.75, 6.25, 6.7},
-      0.0098,
-      5.48663e-5,
-      0.81092,
-      0.01873},
-     {"A7", {2.1, 2.3, 2.6, 2.9, 3.4, 3.9, 4.4, 4.8, 5.2, 5.8, 6.2, 6.9, 7.3, 7.7}, 0.00978, 8.96409e-5, 1.86607, 0.03174},
-     {"A8", {2.0, 2.2, 2.5, 2.8, 3.3, 3.8, 4.3, 4.7, 5.1, 5.7, 6.1, 6.6, 7.1, none}, 0.0096, 8.03373e-5, 1.78949, 0.0244},
-     {"A9", {1.4, 1.6, 1.9, 2.1, 2.6, 3.2, 3.6, 4.1, 4.6, 5.1, 5.6, 6.0, 6.5, 6.9}, 0.00972, 4.64103e-5, 1.15241, 0.01409},
+      {0.0098, 5.48663e-5, 0.81092, 0.01873}},
+     {"A7",
+      {2.1, 2.3, 2.6, 2.9, 3.4, 3.9, 4.4, 4.8, 5.2, 5.8, 6.2, 6.9, 7.3, 7.7},
+      {0.00978, 8.96409e-5, 1.86607, 0.03174}},
+     {"A8", {2.0, 2.2, 2.5, 2.8, 3.3, 3.8, 4.3, 4.7, 5.1, 5.7, 6.1, 6.6, 7.1, none}, {0.0096, 8.03373e-5, 1.78949, 0.0244}},
+     {"A9",
+      {1.4, 1.6, 1.9, 2.1, 2.6, 3.2, 3.6, 4.1, 4.6, 5.1, 5.6, 6.0, 6.5, 6.9},
+      {0.00972, 4.64103e-5, 1.15241, 0.01409}},
      {"A10",
       {1.3, 1.5, 1.8, 2.0, 2.5, 3.1, 3.5, 3.9, 4.5, 5.0, 5.4, 5.9, 6.3, 6.8},
-      0.00959,
-      6.47935e-5,
-      1.06219,
-      0.01968}}};
+      {0.00959, 6.47935e-5, 1.06219, 0.01968}}}};
 
 ThesisSeries seriesOf(const Column& column)
 {
@@ -109,10 +100,10 @@ ThesisSeries seriesOf(const Column& column)
         }
     }
     s.line.points = s.objects.size();
-    s.line.slope = column.slope * thesisUnit;
-    s.line.slopeError = column.slopeError * thesisUnit;
-    s.line.intercept = column.intercept * thesisUnit;
-    s.line.interceptError = column.interceptError * thesisUnit;
+    s.line.slope = column.line.slope * thesisUnit;
+    s.line.slopeError = column.line.slopeError * thesisUnit;
+    s.line.intercept = column.line.intercept * thesisUnit;
+    s.line.interceptError = column.line.interceptError * thesisUnit;
     s.line.rSquared = std::nan("");
     s.line.residual = std::nan("");
     return s;

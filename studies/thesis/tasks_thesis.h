@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -70,12 +69,9 @@ const ThesisSeries* thesisSeries(std::string_view event);
 
 /// Numbers of objects in Table 2.
 inline constexpr std::array<int, 14> thesisObjects{25, 50, 75, 100, 150, 200, 250, 300, 350, 400, 450, 500, 550, 600};
-inline constexpr double thesisUnit = 1e-4;             // of its tables [s]
-inline constexpr double thesisA5 = 0.9e-4;             // whatever the number of objects [s]
-inline constexpr double thesisA6 = 0.8e-4;             // [s]
-inline constexpr double thesisHapticLimit = 0.08e-3;   // in which haptic rendering should be done (chapter VI) [s]
-inline constexpr double thesisMostObjects = 750;       // stable with GHOST 1.2
-inline constexpr double thesisMostObjectsBare = 2600;  // with Basic IO: a bare driver
+inline constexpr double thesisUnit = 1e-4;            // of its tables [s]
+inline constexpr double thesisA6 = 0.8e-4;            // [s]
+inline constexpr double thesisHapticLimit = 0.08e-3;  // in which haptic rendering should be done (chapter VI) [s]
 
 /// A time that is linear in the number of objects.
 struct TaskLine {

@@ -117,7 +117,7 @@ void addBenchLoad(CLI::App& bench)
         "load", "Measure the lateness of ticks while stress-ng loads every core, with and without real-time priority");
     load->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->capture_default_str();
     command::addModel(*load, o->changes);
-    load->add_option("--runs", o->runs, "Sessions of each kind")->check(CLI::Range(1, 20))->capture_default_str();
+    command::addNumber(*load, "--runs", o->runs, "Sessions of each kind", 1, 20);
     load->add_flag("--idle", o->idle, "Run without load, for comparison");
     load->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     load->final_callback([o] { benchLoad(*o); });

@@ -99,8 +99,6 @@ public:
           })
     {
     }
-    ServoBeside(const ServoBeside&) = delete;
-    ServoBeside& operator=(const ServoBeside&) = delete;
     ~ServoBeside() { end(); }
 
     void end()
@@ -300,9 +298,9 @@ void addBenchView(CLI::App& bench)
         ->delimiter(',')
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
-    view->add_option("--width", o->width, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
-    view->add_option("--height", o->height, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
-    view->add_option("--frames", o->frames, "Pictures per case")->check(CLI::Range(10, 100000))->capture_default_str();
+    command::addNumber(*view, "--width", o->width, "Of the picture [pixels]", 320, 8192);
+    command::addNumber(*view, "--height", o->height, "Of the picture [pixels]", 320, 8192);
+    command::addNumber(*view, "--frames", o->frames, "Pictures per case", 10, 100000);
     command::addSetting(*view, o->changes);
     view->add_flag("--alone", o->alone, "Run without a servo loop, for comparison");
     view->add_flag("--ultrasound", o->ultrasound,

@@ -205,9 +205,7 @@ void addBenchIpc(CLI::App& bench)
                                      "Measure the time until a position reaches a viewer's process, through shared memory "
                                      "and through named pipes as in the thesis");
     ipc->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
-    ipc->add_option("--seconds", o->seconds, "Duration of each measurement [s]")
-        ->check(CLI::Range(0.1, 60.0))
-        ->capture_default_str();
+    command::addNumber(*ipc, "--seconds", o->seconds, "Duration of each measurement [s]", 0.1, 60.0);
     ipc->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     ipc->final_callback([o] { benchIpc(*o); });
 }
@@ -218,9 +216,7 @@ void addBenchSync(CLI::App& bench)
     auto* sync = bench.add_subcommand("sync", "Measure the time between two viewers that show the same tick");
     sync->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
     command::addSetting(*sync, o->changes);
-    sync->add_option("--seconds", o->seconds, "Duration of the session [s]")
-        ->check(CLI::Range(1.0, 600.0))
-        ->capture_default_str();
+    command::addNumber(*sync, "--seconds", o->seconds, "Duration of the session [s]", 1.0, 600.0);
     sync->add_option("--size", o->size, "Size of the viewers' windows, WIDTHxHEIGHT [pixels]")->capture_default_str();
     sync->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     sync->final_callback([o] { benchSync(*o); });

@@ -24,7 +24,6 @@
 #include <fstream>
 #include <new>
 #include <stdexcept>
-#include <string>
 #include <thread>
 
 namespace palpate::studies {
@@ -121,14 +120,10 @@ public:
     {
         void* mapped =
             ::mmap(nullptr, sizeof(Seen), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
-        if (mapped == MAP_FAILED) {
-            throw std::runtime_error(failure("no memory for what the viewer's process sees"));
-        }
+        base::failIf(mapped == MAP_FAILED, "{}", failure("no memory for what the viewer's process sees"));
         seen_ = new (mapped) Seen;
         id_ = ::fork();
-        if (id_ < 0) {
-            throw std::runtime_error(failure("the viewer's process cannot be started"));
-        }
+        base::failIf(id_ < 0, "{}", failure("the viewer's process cannot be started"));
         if (id_ == 0) {
             // Whatever happens, this copy of the program runs no further.
             try {
@@ -186,8 +181,6 @@ public:
         // A reader that is gone is an error of write(), and no signal.
         std::signal(SIGPIPE, SIG_IGN);
     }
-    Pipe(const Pipe&) = delete;
-    Pipe& operator=(const Pipe&) = delete;
     ~Pipe() { close(); }
 
     std::string name() const { return folder_ / "position"; }

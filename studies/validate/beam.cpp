@@ -97,11 +97,6 @@ std::vector<MeasuredDrop> dropsIn(const std::filesystem::path& file)
     return out;
 }
 
-double meanDrop(const std::array<Vec3, 3>& at)
-{
-    return -1e3 * (at[0].z + at[1].z + at[2].z) / 3.0;
-}
-
 // Half the difference of two runs, fraction of their mean [%].
 double scatterOf(const std::vector<MeasuredDrop>& drops)
 {
@@ -121,7 +116,8 @@ double fittedModulus(Beam beam, double drop)
 {
     beam.youngsModulus = 250e3;
     for (int i = 0; i < 3; ++i) {
-        beam.youngsModulus *= meanDrop(beamMarkers(beam)) / drop;
+        const auto at = beamMarkers(beam);
+        beam.youngsModulus *= -1e3 * (at[0].z + at[1].z + at[2].z) / 3.0 / drop;
     }
     return beam.youngsModulus;
 }
@@ -207,11 +203,9 @@ Experiment siliconeBeam(const std::filesystem::path& file, bool quick, const Val
                 e.parameters.emplace_back(fmt::format("drop_{}_mm_at_{:.2f}_n", m, drop.tipLoad), predicted);
             }
             for (const double run : drop.runs[m]) {
-                e.picture.curves[m].x.push_back(drop.tipLoad);
-                e.picture.curves[m].y.push_back(run);
+                e.picture.curves[m].add(drop.tipLoad, run);
             }
-            e.picture.curves[markers.size() + m].x.push_back(drop.tipLoad);
-            e.picture.curves[markers.size() + m].y.push_back(predicted);
+            e.picture.curves[markers.size() + m].add(drop.tipLoad, predicted);
         }
     }
     const ErrorSummary summary = summaryOf(errors);

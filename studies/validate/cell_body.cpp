@@ -7,11 +7,7 @@ namespace palpate::studies {
 
 using namespace chainmail;
 
-namespace {
-
 constexpr QuasiNewton::Limits limits{6, 12};  // more steps cost more than they save
-
-}  // namespace
 
 CellBody::CellBody(Index3 cells, double side)
     : layout_(Layout::of(cells.x + 1, cells.y + 1, cells.z + 1)),

@@ -73,8 +73,7 @@ Experiment FolderRun::ultrasoundChecks()
     ValidateCurve points{"checks", {}, {}, false};
     std::size_t held = 0;
     for (const ultrasound::Check& c : checks) {
-        points.x.push_back(static_cast<double>(points.x.size() + 1));
-        points.y.push_back(1e2 * std::abs(c.measured - c.wanted) / c.tolerance);
+        points.add(static_cast<double>(points.x.size() + 1), 1e2 * std::abs(c.measured - c.wanted) / c.tolerance);
         held += c.good() ? 1 : 0;
     }
     const ErrorSummary summary = summaryOf(points.y);

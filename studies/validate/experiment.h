@@ -59,6 +59,12 @@ struct ValidateCurve {
     std::string name;
     std::vector<double> x, y;
     bool line = true;  // false: points
+
+    void add(double atX, double atY)
+    {
+        x.push_back(atX);
+        y.push_back(atY);
+    }
 };
 
 struct ValidatePicture {

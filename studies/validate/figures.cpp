@@ -1,6 +1,7 @@
 #include <studies/validate/figures.h>
 
 #include <base/outputs.h>
+#include <base/split.h>
 #include <command/json.h>
 #include <report/chart/chart.h>
 #include <report/html.h>
@@ -8,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <array>
 #include <cmath>
 
 namespace palpate::studies {
@@ -18,24 +20,8 @@ namespace {
 
 const char* wordOf(Verdict verdict)
 {
-    switch (verdict) {
-        case Verdict::holds:
-            return "holds";
-        case Verdict::fails:
-            return "FAILS";
-        case Verdict::notRun:
-            break;
-    }
-    return "not run";
-}
-
-std::string quotedCell(const std::string& text)
-{
-    std::string out = "\"";
-    for (const char c : text) {
-        out += c == '"' ? "\"\"" : std::string(1, c);
-    }
-    return out + "\"";
+    constexpr std::array words{"holds", "FAILS", "not run"};
+    return words[static_cast<std::size_t>(verdict)];
 }
 
 json number(double value)
@@ -124,10 +110,11 @@ std::string experimentsCsv(const std::vector<Experiment>& experiments)
 {
     std::string out = "name,verdict,error_pct,worst_pct,scatter_pct,bound_pct,quantity,source,fitted_on,predicted,note\n";
     for (const Experiment& e : experiments) {
-        out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", e.name,
-                           e.verdict == Verdict::fails ? "fails" : wordOf(e.verdict), percent(e, e.error),
-                           percent(e, e.worst), percent(e, e.scatter), percent(e, e.bound), quotedCell(e.quantity),
-                           quotedCell(e.source), quotedCell(e.fittedOn), quotedCell(e.predicted), quotedCell(e.note));
+        out +=
+            fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", e.name,
+                        e.verdict == Verdict::fails ? "fails" : wordOf(e.verdict), percent(e, e.error), percent(e, e.worst),
+                        percent(e, e.scatter), percent(e, e.bound), base::csvQuoted(e.quantity), base::csvQuoted(e.source),
+                        base::csvQuoted(e.fittedOn), base::csvQuoted(e.predicted), base::csvQuoted(e.note));
     }
     return out;
 }

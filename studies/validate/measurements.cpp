@@ -73,9 +73,8 @@ double Measurements::number(std::size_t row, std::string_view column) const
     const std::string& cell = text(row, column);
     char* end = nullptr;
     const double value = std::strtod(cell.c_str(), &end);
-    if (cell.empty() || *end != '\0' || !std::isfinite(value)) {
-        throw base::error("{}, line {}: {} is '{}', which is no number", file_.string(), lines_[row], column, cell);
-    }
+    base::failIf(cell.empty() || *end != '\0' || !std::isfinite(value), "{}, line {}: {} is '{}', which is no number",
+                 file_.native(), lines_[row], column, cell);
     return value;
 }
 

@@ -205,8 +205,7 @@ Experiment corridorExperiment(const char* name, const char* what, const std::vec
         e.worst = largerError(e.worst, std::abs(off));
         for (auto [curve, value] : {std::pair(&ours, predicted[i]), std::pair(&low, corridor.low[i]),
                                     std::pair(&high, corridor.high[i]), std::pair(&mean, corridor.mean[i])}) {
-            curve->x.push_back(1e3 * (static_cast<double>(i) + 0.5) * strokeStep);
-            curve->y.push_back(value);
+            curve->add(1e3 * (static_cast<double>(i) + 0.5) * strokeStep, value);
         }
     }
     e.error = bins > 0 ? 1e2 * static_cast<double>(outside) / static_cast<double>(bins) : NAN;
@@ -320,9 +319,7 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     double spread = 0.0;
     for (std::size_t i = 0; i < heldAt.size(); ++i) {
         const auto found = measured.find(heldAt[i]);
-        if (found == measured.end()) {
-            throw base::error("{}: has no force {} s after the stop", file.string(), heldAt[i]);
-        }
+        base::failIf(found == measured.end(), "{}: has no force {} s after the stop", file.native(), heldAt[i]);
         const double wanted = meanFrom(found->second, 0);
         const double off = ours.held[i] / ours.held.front() - wanted;
         if (heldAt[i] == 1.0 || heldAt[i] == 10.0) {
@@ -331,10 +328,8 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
         const auto apart = base::mapped<double>(found->second, [&](const double r) { return 1e2 * (r - wanted); });
         spread = largerError(spread, summaryOf(apart).rms);
         e.worst = largerError(e.worst, 1e2 * std::abs(off));
-        mean.x.push_back(heldAt[i]);
-        mean.y.push_back(wanted);
-        line.x.push_back(heldAt[i]);
-        line.y.push_back(ours.held[i] / ours.held.front());
+        mean.add(heldAt[i], wanted);
+        line.add(heldAt[i], ours.held[i] / ours.held.front());
     }
     e.scatter = spread;
     e.parameters = {{"relaxing_fast", fit.weights[0]}, {"relaxing_slow", fit.weights[1]}};

@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <memory>
 
 namespace palpate::studies {
@@ -73,8 +72,7 @@ double forceOver(const Lump& lump)
                     1e3 * (lump.depth + 0.5 * lump.diameter),
                     1e-3 * (lump.youngsModulus > 0.0 ? lump.youngsModulus : moduli.front())),
         "lump.toml");
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    const haptics::SessionModel model = haptics::buildModel(std::move(scene), std::move(tissue));
+    const haptics::SessionModel model = haptics::buildModel(std::move(scene));
     constexpr double gap = 0.5e-3;
     constexpr double hold = 0.1;
     PosePath path{"palpation", {}};

@@ -30,8 +30,7 @@ haptics::SessionModel blockOfLiver(bool relaxes)
                     "[model]\nrelaxation = {}\n",
                     relaxes),
         "relaxation.toml");
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    return haptics::buildModel(std::move(scene), std::move(tissue));
+    return haptics::buildModel(std::move(scene));
 }
 
 volume::Relaxation ofLiver(const haptics::SessionModel& model)
@@ -112,8 +111,7 @@ Experiment held(bool quick, const ValidateProgress& progress)
     for (std::size_t i = 0; i < std::min(ours.size(), exact.size()); ++i) {
         errors.push_back(ours[i] - exact[i]);
         for (const auto& [curve, force] : {std::pair(&simulated, ours[i]), std::pair(&wanted, exact[i])}) {
-            curve->x.push_back(static_cast<double>(i) * reliefTick);
-            curve->y.push_back(force);
+            curve->add(static_cast<double>(i) * reliefTick, force);
         }
     }
     const double largest = *std::ranges::max_element(exact);
@@ -189,10 +187,8 @@ Experiment lost(bool quick, const ValidateProgress& progress)
         errors.push_back(1e2 * (ours - exact) / exact);
         e.parameters.emplace_back(fmt::format("lost_{:g}_hz_uj", frequency), 1e6 * ours);
         e.parameters.emplace_back(fmt::format("exact_{:g}_hz_uj", frequency), 1e6 * exact);
-        simulated.x.push_back(frequency);
-        simulated.y.push_back(1e6 * ours);
-        wanted.x.push_back(frequency);
-        wanted.y.push_back(1e6 * exact);
+        simulated.add(frequency, 1e6 * ours);
+        wanted.add(frequency, 1e6 * exact);
     }
     const ErrorSummary summary = summaryOf(errors);
     e.error = e.worst = summary.worst;

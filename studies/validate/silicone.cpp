@@ -73,9 +73,8 @@ std::vector<Material> materialsIn(const std::filesystem::path& file)
         }
     }
     for (const Material& m : all) {
-        if (m.strain != all.front().strain) {
-            throw base::error("{}: {} is measured at other strains than {}", file.string(), m.name, all.front().name);
-        }
+        base::failIf(m.strain != all.front().strain, "{}: {} is measured at other strains than {}", file.native(), m.name,
+                     all.front().name);
     }
     return all;
 }

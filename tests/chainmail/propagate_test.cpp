@@ -28,6 +28,24 @@ struct State {
     PropagateScratch scratch;
 };
 
+// Largest violation of any link [m].
+double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept
+{
+    float worst = 0.0F;
+    for (Node a = 0; a < lattice.tissue.size(); ++a) {
+        if (lattice.tissue[a] == 0) {
+            continue;
+        }
+        for (int side = 1; side < 6; side += 2) {
+            const Node b = lattice.beside(a, side);
+            if (lattice.isNode(b)) {
+                worst = std::max(worst, glm::length(correction(u[b] - u[a], side, lattice.between(a, b))));
+            }
+        }
+    }
+    return static_cast<double>(worst);
+}
+
 // One node of a half-space at rest, pushed by d along the axis into it: with axial slack a and shear slack g,
 //     u(i, j, k) = max(0, d - a |k| - g (|i| + |j|))
 TEST(Propagate, OneNodePushedIntoAHalfSpaceFollowsTheClosedForm)

@@ -62,8 +62,6 @@ class DicomPixels {
 public:
     explicit DicomPixels(const DicomObject& object);
     ~DicomPixels();
-    DicomPixels(const DicomPixels&) = delete;
-    DicomPixels& operator=(const DicomPixels&) = delete;
 
     /// rows x columns values, x fastest. The span is good until the next call.
     std::span<const std::int32_t> frame(std::size_t index);

@@ -115,11 +115,6 @@ void placeAxes(const std::filesystem::path& file, bool oriented, const ImportOpt
 
 namespace {
 
-bool endsWith(const std::string& text, const std::string& ending)
-{
-    return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
-}
-
 bool isVdb(const std::filesystem::path& file)
 {
     return lowerCase(file.extension().string()) == ".vdb";
@@ -132,7 +127,7 @@ SourceReader readerFor(const std::filesystem::path& file)
 {
     const std::string name = lowerCase(file.filename().string());
     const auto ends = [&](std::initializer_list<const char*> endings) {
-        return std::any_of(endings.begin(), endings.end(), [&](const char* e) { return endsWith(name, e); });
+        return std::ranges::any_of(endings, [&](const char* e) { return name.ends_with(e); });
     };
     if (ends({".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})) {
         return readNifti;
@@ -140,10 +135,7 @@ SourceReader readerFor(const std::filesystem::path& file)
     if (ends({".nrrd", ".nhdr"})) {
         return readNrrd;
     }
-    if (ends({".mha", ".mhd"})) {
-        return readMeta;
-    }
-    return ends({".mgz", ".mgh"}) ? readMgh : nullptr;
+    return ends({".mha", ".mhd"}) ? readMeta : ends({".mgz", ".mgh"}) ? readMgh : nullptr;
 }
 
 void checkFile(const std::filesystem::path& file)

@@ -97,12 +97,10 @@ std::vector<std::int32_t> decodeJpeg2000(std::span<const std::byte> bytes, int c
     // What the stream claims must be what DICOM claims, before it is decoded.
     const auto width = static_cast<OPJ_UINT32>(columns);
     const auto height = static_cast<OPJ_UINT32>(rows);
-    if (image->numcomps != 1 || image->x1 - image->x0 != width || image->y1 - image->y0 != height ||
-        image->comps[0].dx != 1 || image->comps[0].dy != 1) {
-        throw base::error(
-            "its JPEG 2000 data are {} x {} pixels of {} values, but the header says {} x {} of 1: get the file again",
-            image->x1 - image->x0, image->y1 - image->y0, image->numcomps, columns, rows);
-    }
+    base::failIf(image->numcomps != 1 || image->x1 - image->x0 != width || image->y1 - image->y0 != height ||
+                     image->comps[0].dx != 1 || image->comps[0].dy != 1,
+                 "its JPEG 2000 data are {} x {} pixels of {} values, but the header says {} x {} of 1: get the file again",
+                 image->x1 - image->x0, image->y1 - image->y0, image->numcomps, columns, rows);
     if (opj_decode(codec.get(), stream.get(), image.get()) == OPJ_FALSE || image->comps[0].data == nullptr ||
         image->comps[0].w != width || image->comps[0].h != height) {
         damaged();

@@ -41,7 +41,7 @@ double allowed(const LabelRules& rules, double value)
 LabelSink::LabelSink(std::filesystem::path file, Index3 size, LabelRules rules)
     : file_(std::move(file)), size_(size), rules_(rules), seen_(65536, false)
 {
-    labels_.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z));
+    labels_.reserve(base::countOf(size));
 }
 
 std::string LabelSink::here() const

@@ -3,7 +3,6 @@
 #include <volume/resample.h>
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 // Inside volume/ only: sets of voxels, and what mathematical morphology does with them. Source of the operations: J. Serra,

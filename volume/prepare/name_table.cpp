@@ -190,15 +190,11 @@ void apply(const NameTable& table, const std::filesystem::path& file, const Labe
         own->colour = own->colour ? own->colour : entry->colour;
         ++given;
     }
-    if (!contradictions.empty()) {
-        throw base::error(
-            "{}: the names in {} contradict those in the file: {}: leave the table out, or name the right one",
-            file.native(), table.file.string(), joined(contradictions));
-    }
-    if (given == 0) {
-        throw base::error("{}: names none of the labels of {} ({}): is it the table of another file?", table.file.native(),
-                          file.filename().string(), joined(missing));
-    }
+    base::failIf(!contradictions.empty(),
+                 "{}: the names in {} contradict those in the file: {}: leave the table out, or name the right one",
+                 file.native(), table.file.native(), joined(contradictions));
+    base::failIf(given == 0, "{}: names none of the labels of {} ({}): is it the table of another file?",
+                 table.file.native(), file.filename().string(), joined(missing));
     if (!missing.empty()) {
         labels.warnings.push_back(fmt::format("{} has no name for {} of the labels: {}", table.file.filename().string(),
                                               missing.size(), joined(missing)));

@@ -8,7 +8,6 @@
 #include <volume/image_check.h>
 #include <volume/prepare/body.h>
 #include <volume/prepare/name_table.h>
-#include <volume/provenance.h>
 #include <volume/resample.h>
 
 #include <fmt/chrono.h>
@@ -65,12 +64,10 @@ volume::CompanionImage companionOf(const ImportRequest& o, const volume::Importe
         bare += std::isnan(companion.values[i]) && labels.values[i] != 0 ? 1 : 0;
         companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
     }
-    if (2 * bare > labelled) {
-        throw base::error(
-            "{}: it covers less than half of the labelled voxels of {}: give the image that the "
-            "segmentation was made of, in the same patient frame",
-            o.image.string(), o.input.filename().string());
-    }
+    base::failIf(2 * bare > labelled,
+                 "{}: it covers less than half of the labelled voxels of {}: give the image that the "
+                 "segmentation was made of, in the same patient frame",
+                 o.image.native(), o.input.filename().string());
     if (bare > 0) {
         notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
                                     companion.stiffness.points.empty() ? "" : ", for their stiffness too"));

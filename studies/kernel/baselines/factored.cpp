@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <utility>
-#include <vector>
 
 namespace palpate::studies {
 

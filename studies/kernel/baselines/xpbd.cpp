@@ -11,13 +11,9 @@
 
 namespace palpate::studies {
 
-namespace {
-
 constexpr double reach = 4e-3;  // how far from the sphere a tick looks for points that it may meet [m]
 constexpr std::size_t tetsPerCell = 5;
 constexpr std::size_t colours = 8 * tetsPerCell;
-
-}  // namespace
 
 Xpbd::Xpbd(TetBody mesh, const XpbdOptions& options)
     : mesh_(std::move(mesh)), options_(options), substep_(static_cast<float>(options.tick / options.substeps))
