@@ -17,6 +17,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <ctime>
 #include <filesystem>
 #include <string>
 #include <string_view>

@@ -100,7 +100,8 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
       period_(options.heldPeriod),
       turns_(body.levels.size(), Index3(0))
 {
-    const std::size_t cells = volume::NodeGrid{elastic_.stack().windows().front().size(), Vec3(0.0), 1.0}.count();
+    const Index3 size = elastic_.stack().windows().front().size();
+    const std::size_t cells = base::countOf(size);
     strained_.assign(shape.u().size(), 0);
     before_.resize(cells);
     now_.resize(cells);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <datasets/insert.h>
 #include <datasets/scene.h>
 
 #include <cstddef>

@@ -62,7 +62,8 @@ Database::~Database()
 
 void Database::execute(const std::string& sql)
 {
-    base::failIf(sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK, "{}", sqlite3_errmsg(handle_));
+    const bool failed = sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK;
+    base::failIf(failed, "{}", sqlite3_errmsg(handle_));
 }
 
 Statement::Statement(const Database& database, const std::string& sql) : database_(database.get())

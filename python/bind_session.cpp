@@ -2,6 +2,7 @@
 #include <python/scene_box.h>
 #include <python/tick_rows.h>
 
+#include <session/devices.h>
 #include <session/figures.h>
 #include <volume/direction.h>
 

@@ -3,6 +3,7 @@
 // Scenes and volumes as Python holds them.
 
 #include <datasets/scene.h>
+#include <python/convert.h>
 #include <python/live_session.h>
 #include <volume/tissue.h>
 

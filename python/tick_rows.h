@@ -3,6 +3,7 @@
 // A tick and its events as rows of numpy arrays.
 
 #include <haptics/tick.h>
+#include <python/convert.h>
 
 #include <array>
 #include <cstdint>

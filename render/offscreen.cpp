@@ -1,5 +1,6 @@
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/png.h>
 #include <render/events.h>
 #include <render/follower.h>
 #include <render/hosts.h>

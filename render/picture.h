@@ -13,6 +13,7 @@
 #include <render/screen_plan.h>
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
+#include <render/traces.h>
 #include <render/ultrasound_picture.h>
 #include <render/volume_picture.h>
 

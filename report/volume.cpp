@@ -1,5 +1,7 @@
 #include <report/volume.h>
 
+#include <volume/provenance.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

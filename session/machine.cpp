@@ -221,11 +221,15 @@ FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad&
     return found;
 }
 
+double overrunsOf(const haptics::ServoTiming& timing) noexcept
+{
+    return static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
+}
+
 std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene& scene, const haptics::ServoTiming& timing,
                       Clock::time_point now)
 {
-    const double overruns =
-        static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
+    const double overruns = overrunsOf(timing);
     const auto settings = datasets::elasticSettings();
     const auto at = std::find(settings.begin(), settings.end(), scene.model.setting);
     if (timing.ticks < fewestTicks || overruns <= bearableOverruns || at == settings.begin() || at == settings.end()) {

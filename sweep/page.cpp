@@ -30,7 +30,7 @@ json axesOf(const SweepPlan& plan)
     for (const auto& a : plan.axes) {
         const bool words = !a.values.empty() &&
                            (std::holds_alternative<std::string>(a.values[0]) || std::holds_alternative<bool>(a.values[0]));
-        json values = base::mapped<json>(a.values, valueOf);
+        json values = base::mapped<json>(a.values, [](const auto& v) { return valueOf(v); });
         out.push_back({{"name", a.name}, {"key", a.key}, {"log", a.log}, {"words", words}, {"values", values}});
     }
     return out;

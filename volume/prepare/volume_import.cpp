@@ -8,6 +8,7 @@
 #include <volume/image_check.h>
 #include <volume/prepare/body.h>
 #include <volume/prepare/name_table.h>
+#include <volume/provenance.h>
 #include <volume/resample.h>
 
 #include <fmt/chrono.h>
