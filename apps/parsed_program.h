@@ -19,7 +19,9 @@ namespace palpate::apps {
 template <typename Work>
 int exitStatus(const CLI::App& app, const Work& work)
 {
-    const auto say = [&](const std::string& what) { std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), what.c_str()); };
+    const auto say = [&](const std::string& what) {
+        std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), what.c_str());
+    };
     try {
         work();
         return 0;

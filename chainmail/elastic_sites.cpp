@@ -159,7 +159,8 @@ void Elastic::spreadPressure() noexcept
             const double byDepth = radiusOfPatch(tool);
             const bool knowsForce = s.level == 0 && !body.relaxes;
             const double now = held.changed();
-            const double byForce = knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
+            const double byForce =
+                knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
             patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
             const double shallow = std::max(1.0 - glm::length(tool.pushed) / tool.shape.widest(), 0.0);
             confined = byForce > byDepth ? std::pow(byForce / byDepth, shallow) : 1.0;

@@ -45,8 +45,8 @@ struct HeldTool {
     /// @param holdsBack  false: as it is
     ElasticTool place(const ElasticTool& tool, const ElasticBody& body, bool isSmall, bool holdsBack) noexcept;
     /// By how much the force of the last call has to be scaled for the depth of this one, to the power of 3/2, where that
-    /// has changed by more than five percent: a tool that leaves is out after a few calls. Less is left as it is, since what
-    /// follows every tremor of a hand makes it larger.
+    /// has changed by more than five percent: a tool that leaves is out after a few calls. Less is left as it is, since
+    /// what follows every tremor of a hand makes it larger.
     double changed() const noexcept;
     /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
     /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.

@@ -71,9 +71,8 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
         const haptics::TickRecord& now = simulation.tick(then.device);
         const bool same = comparison.add(then, now);
         base::failIf(
-            !same,
-            "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was changed: {}", file,
-            next, record.info().build, comparison.inWords());
+            !same, "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was changed: {}",
+            file, next, record.info().build, comparison.inWords());
         if (each) {
             each(now);
         }

@@ -53,7 +53,8 @@ Errand drawPeople(State& state)
     const PersonEntry* const before = chosenPerson(state);
     const std::size_t chosen = before == nullptr ? 0 : static_cast<std::size_t>(before - state.people.data()) + 1;
     const auto name = [&](std::size_t n) { return n == 0 ? nobody : state.people[n - 1].name; };
-    if (const auto now = choice(label, state.person.empty() ? nobody : state.person, state.people.size() + 1, chosen, name)) {
+    if (const auto now =
+            choice(label, state.person.empty() ? nobody : state.person, state.people.size() + 1, chosen, name)) {
         state.person = *now == 0 ? "" : state.people[*now - 1].name;
         errand = Errand::choosePerson;
     }

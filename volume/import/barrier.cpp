@@ -192,8 +192,7 @@ Result apart(const std::filesystem::path& path, const char* library, const Impor
 {
     int ends[2];
     const bool none = ::pipe2(ends, O_CLOEXEC) != 0;
-    refuseIf(none, path, "no pipe for reading it can be made ({}): try again",
-             std::strerror(errno));
+    refuseIf(none, path, "no pipe for reading it can be made ({}): try again", std::strerror(errno));
     const pid_t child = ::fork();
     if (child == 0) {
         ::close(ends[0]);
