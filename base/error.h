@@ -14,8 +14,7 @@ std::runtime_error error(fmt::format_string<Values...> message, Values&&... valu
     return std::runtime_error(fmt::format(message, std::forward<Values>(values)...));
 }
 
-/// Throws that error if `wrong`. The values are evaluated in any case, maybe first: none may need, or be, what `wrong`
-/// does.
+/// Throws that error if `wrong`. The values are evaluated in any case, and maybe first: name only such as can be.
 template <typename... Values>
 void failIf(bool wrong, fmt::format_string<Values...> message, Values&&... values)
 {
