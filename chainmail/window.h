@@ -157,7 +157,7 @@ struct Window {
     bool anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept;
     bool contains(Index3 node) const noexcept  // in the level's indices
     {
-        return volume::NodeGrid{box, Vec3(0.0), 1.0}.contains(node - low);
+        return base::holds(box, node - low);
     }
     std::size_t at(Index3 node) const noexcept
     {

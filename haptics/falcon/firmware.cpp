@@ -91,10 +91,10 @@ void compareEcho(std::span<const std::uint8_t> sent, std::span<const std::uint8_
     const auto at = offset + static_cast<std::size_t>(there - sent.begin());
     const std::string what =
         back == echo.end() ? std::string("did not come back") : fmt::format("came back as 0x{:02x}", *back);
-    troubleIf(true, Cause::garbled,
-              "firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a hub, or "
-              "take another cable",
-              at + 1, total, *there, what);
+    throw Trouble(Cause::garbled,
+                  fmt::format("firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead "
+                              "of a hub, or take another cable",
+                              at + 1, total, *there, what));
 }
 
 // What the bytes are where they cannot be a program for a processor; empty where they may be.
