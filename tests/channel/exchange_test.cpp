@@ -10,6 +10,7 @@
 #include <csignal>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <thread>
 #include <vector>
@@ -116,14 +117,15 @@ struct Seen {
     std::uint64_t states = 0, displaced = 0, torn = 0, backwards = 0;
 };
 
-// Reads until both have been seen `enough` times and checks every copy against its closed form.
+// Reads until both have been seen `enough` times, for a minute at most, and checks every copy against its closed form.
 Seen readMany(const std::string& session, std::uint64_t enough)
 {
     const auto subscriber = Subscriber::attach(session);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     Seen seen;
     std::uint64_t last = 0;
     const auto displaced = std::make_unique<Displaced>();
-    while (subscriber && (seen.states < enough || seen.displaced < enough)) {
+    while (subscriber && (seen.states < enough || seen.displaced < enough) && std::chrono::steady_clock::now() < end) {
         if (const auto state = subscriber->state()) {
             ++seen.states;
             seen.torn += !whole(*state);
@@ -142,6 +144,8 @@ Seen readMany(const std::string& session, std::uint64_t enough)
     return seen;
 }
 
+// Writes without a rest but for one of a millisecond after every 64th displaced copy: a reader that is slower than this writer,
+// as it may be under a sanitizer, gets one then.
 void hammer(Publisher& publisher, const std::atomic<bool>& stop)
 {
     for (std::uint64_t tick = 1; !stop.load(std::memory_order_relaxed); ++tick) {
@@ -150,6 +154,8 @@ void hammer(Publisher& publisher, const std::atomic<bool>& stop)
             fillDisplaced(publisher.backBuffer(), tick);
             publisher.publishDisplaced();
         }
+        if (tick % 256 == 0)
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
 }
 
