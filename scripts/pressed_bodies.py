@@ -30,6 +30,7 @@ def scene(volume, radius, entry, aim, model='setting = "SETTING"'):
         name = "pressed"
         volume.file = "{volume}"
         tool = {{kind = "sphere", radius_mm = {radius}}}
+        safety.device = "ideal"
         dffb.mode = "off"
         target = {{structure = "aim", entry_mm = {entry}, aim_mm = {aim}}}
         model.level = "elastic"
