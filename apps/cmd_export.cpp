@@ -87,7 +87,7 @@ void checkOptions(ExportArguments& o)
     if (!isVtu(o.output) && !isPng(o.output)) {
         volume::checkExportName(o.output);
     }
-    base::checkOutputs({o.output, o.map, o.json}, {o.volume, o.record, o.like});
+    base::checkOutputs({o.output, volume::exportedDataOf(o.output), o.map, o.json}, {o.volume, o.record, o.like});
 }
 
 double timeFrom(const std::string& text)

@@ -120,6 +120,10 @@ void addReading(CLI::App& command, ImportArguments& o)
     command.add_option("--image-volume", o.imageVolume, "Number of the volume in a 4D image, from 1")
         ->check(CLI::Range(1, 1 << 30))
         ->type_name("N");
+    command
+        .add_option("--image-axes", o.imageAxes,
+                    "Directions of the image's voxel axes, if its file does not define them (default: as --axes)")
+        ->type_name("XYZ");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
         ->type_name("FILE");
     command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; not needed for DICOM")

@@ -12,7 +12,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
 {
     const bool elastic = c.level == ModelLevel::elastic;
     nlohmann::json out{{"level", datasets::modelLevels[static_cast<std::size_t>(c.level)]},
-                       {"spacing_mm", 1e3 * (c.level == ModelLevel::elastic ? c.elastic.spacing : c.spacing)},
+                       {"spacing_mm", 1e3 * (elastic ? c.elastic.spacing : c.spacing)},
                        {"windows", nlohmann::json::array()},
                        {"sweeps", elastic ? c.elastic.cycles : 0},
                        {"strain", elastic && !volume::isSmall(c.elastic.law) ? "finite" : "small"},

@@ -321,7 +321,10 @@ void applyConstraints(SweepPlan& plan, Section& top)
     const UnitPoints all = std::move(plan.points);
     for (const auto& point : all) {
         plan.points = {point};
-        const SweepCase c = sweepPoint(plan, 0);
+        SweepCase c = sweepPoint(plan, 0);
+        c.variables.erase("point");  // no point has its number yet, nor what follows from it
+        c.variables.erase("repeat");
+        c.variables.erase("seed");
         try {
             const bool meets =
                 std::ranges::all_of(plan.constraints, [&](const auto& formula) { return holds(formula, plan, c); });

@@ -37,9 +37,8 @@ struct OutputInfo {
     std::string name;  // ends in its unit
     std::string meaning;
 };
-/// In the order of its results. Those that measure time (`timing`) are not the same on every run.
+/// In the order of its results.
 std::vector<OutputInfo> outputsOf(ProcedureKind kind);
-inline constexpr std::string_view tickTime = "tick_us";  // mean processor time of a tick in contact: a timing
 
 /// What a procedure measured.
 struct ProcedureResult {

@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
+#include <base/split.h>
 #include <sweep/lock.h>
 #include <sweep/pool.h>
 
@@ -43,6 +44,12 @@ struct Answer {
     int status = 0;
     std::string text;  // standard output and error
 };
+
+// A name in which sbatch replaces nothing.
+std::string literally(const std::string& name)
+{
+    return fmt::format("{}", fmt::join(base::splitAt('%', name), "%%"));
+}
 
 Answer ask(const std::vector<std::string>& words)
 {
@@ -157,7 +164,7 @@ private:
         option("--job-name=palpate-sweep");
         option(fmt::format("--array=0-{}", tasks - 1));
         option("--ntasks=1");
-        option(fmt::format("--output={}", (folder_.path() / "slurm" / "%A_%a.log").string()));
+        option(fmt::format("--output=\"{}\"", literally((folder_.path() / "slurm").string()) + "/%A_%a.log"));
         for (const auto& [name, value] : {std::pair<const char*, const std::string&>{"partition", settings_.partition},
                                           {"time", settings_.time},
                                           {"account", settings_.account},

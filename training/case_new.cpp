@@ -11,8 +11,6 @@
 
 #include <unistd.h>
 
-#include <fstream>
-#include <iterator>
 #include <string>
 
 namespace palpate::training {
@@ -74,8 +72,7 @@ Case makeCase(const NewCase& wanted)
 void namePicture(const Case& made, const std::string& picture)
 {
     const fs::path file = made.folder / caseFile;
-    std::ifstream in(file);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::string text = datasets::readText(file);
     // Before any table, a key is the case's own.
     base::writeWhole(file, fmt::format("picture = {}\n{}", datasets::tomlString(picture), text));
     loadCase(made.folder);

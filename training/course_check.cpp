@@ -173,11 +173,14 @@ std::size_t storeAndKill(const std::filesystem::path& file, const std::vector<Si
     }
     ::usleep(static_cast<useconds_t>(random() % longest));
     ::kill(child, SIGKILL);
-    ::waitpid(child, nullptr, 0);
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    const bool failed = WIFEXITED(status);  // one that stored all waits to be killed
     while (::read(ends[0], &c, 1) == 1) {
         ++said;
     }
     ::close(ends[0]);
+    base::failIf(failed, "{}: sessions cannot be stored there: is the disk full?", file.native());
     return said;
 }
 

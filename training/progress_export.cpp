@@ -80,12 +80,24 @@ json resultOf(const StoredSession& s, std::optional<bool> met)
     return result;
 }
 
+// A part of a urn: what may not stand in one is written as bytes in hexadecimal (RFC 3986).
+std::string urnPart(std::string_view text)
+{
+    std::string out;
+    for (const char c : text) {
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                           std::string_view("-._~").find(c) != std::string_view::npos;
+        out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+    return out;
+}
+
 json statement(const PersonProgress& p, const StoredSession& s)
 {
     const auto met = metOf(p, s);
     const char* const verb = !met ? "completed" : *met ? "passed" : "failed";
-    const std::string what = s.exercise.empty() ? "urn:palpate:case:" + (s.caseId.empty() ? s.scene : s.caseId)
-                                                : "urn:palpate:exercise:" + s.curriculum + ":" + s.exercise;
+    const std::string what = s.exercise.empty() ? "urn:palpate:case:" + urnPart(s.caseId.empty() ? s.scene : s.caseId)
+                                                : "urn:palpate:exercise:" + urnPart(s.curriculum) + ":" + urnPart(s.exercise);
     json context = {{"platform", s.build},
                     {"extensions",
                      {{"urn:palpate:case", s.caseId},
@@ -117,7 +129,7 @@ void writeProgressCsv(const std::filesystem::path& file, const std::vector<Perso
     for (const PersonProgress& p : people) {
         for (const StoredSession& s : p.sessions) {
             const auto met = metOf(p, s);
-            out += fmt::format("\n{},{},{},{},{},{},{},{:g},{},{},{},{},{}", cell(p.person.name), s.id, s.started,
+            out += fmt::format("\n{},{},{},{},{},{},{},{:g},{},{},{},{},{}", cell(p.person.name), s.id, cell(s.started),
                                cell(s.curriculum), cell(s.exercise), cell(s.caseId), s.test ? "test" : "practice",
                                s.guidance, met ? (*met ? "yes" : "no") : "", s.rating > 0 ? std::to_string(s.rating) : "",
                                cell(s.device), cell(s.build), cell(s.record));

@@ -4,6 +4,7 @@
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
+#include <base/split.h>
 #include <haptics/measures.h>
 #include <report/html.h>
 
@@ -43,7 +44,8 @@ std::string limitInWords(std::string_view side, double value, const haptics::Mea
 {
     const std::string words = fmt::format("{} {:.{}f}", side, value, m.decimals);
     // A limit between two printed values keeps its own digits.
-    const bool whole = std::abs(std::stod(words.substr(side.size())) - value) < 1e-9 * std::max(1.0, std::abs(value));
+    const double printed = base::numberIn(words.substr(side.size() + 1)).value_or(value);
+    const bool whole = std::abs(printed - value) < 1e-9 * std::max(1.0, std::abs(value));
     return (whole ? words : fmt::format("{} {:g}", side, value)) + (*m.unit == 0 ? "" : " ") + m.unit;
 }
 
@@ -216,7 +218,7 @@ std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json&
     std::string notes;
     for (const StoredSession& s : e.sessions) {
         if (!s.note.empty() || s.rating > 0) {
-            notes += fmt::format("<li>{}: {}{}</li>", s.started.substr(0, 10),
+            notes += fmt::format("<li>{}: {}{}</li>", escape(s.started.substr(0, 10)),
                                  s.rating > 0 ? fmt::format("rated {} of 5. ", s.rating) : "", escape(s.note));
         }
     }

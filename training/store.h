@@ -116,6 +116,7 @@ public:
 
 private:
     std::set<std::filesystem::path> recordsOf(const Person& person) const;
+    void emptyLog();
 
     std::filesystem::path file_;
     std::unique_ptr<haptics::format::Database> database_;

@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <volume/export_source.h>
+#include <volume/import/header_text.h>
 #include <volume/runs.h>
 
 #include <zlib.h>
@@ -27,14 +28,6 @@ namespace {
 
 constexpr int packLevel = 6;
 
-std::string lowerName(const std::filesystem::path& file)
-{
-    std::string name = file.filename().string();
-    std::transform(name.begin(), name.end(), name.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return name;
-}
-
 bool ends(const std::string& name, std::string_view ending)
 {
     return name.size() > ending.size() && name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
@@ -42,7 +35,7 @@ bool ends(const std::string& name, std::string_view ending)
 
 bool isSegmentation(const std::filesystem::path& file)
 {
-    return ends(lowerName(file), ".seg.nrrd");
+    return ends(lowerCase(file.filename().string()), ".seg.nrrd");
 }
 
 // Value, extent and given name of every label that a voxel has.
@@ -73,7 +66,7 @@ std::vector<ExportedSegment> segmentsOf(const LabelImage& image, std::span<const
 void writeAny(const std::filesystem::path& file, const VoxelStream& voxels, std::span<const ExportedSegment> segments,
               const ExportOptions& options)
 {
-    const std::string name = lowerName(file);
+    const std::string name = lowerCase(file.filename().string());
     if (ends(name, ".nii") || ends(name, ".nii.gz")) {
         writeNifti(file, voxels, segments, options);
     } else if (ends(name, ".nrrd")) {
@@ -225,7 +218,7 @@ void writeSlices(OutputFile& out, const VoxelStream& voxels, bool planar, const 
 void checkExportName(const std::filesystem::path& file)
 {
     static constexpr std::array<std::string_view, 5> endings{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"};
-    const std::string name = lowerName(file);
+    const std::string name = lowerCase(file.filename().string());
     if (std::none_of(endings.begin(), endings.end(), [&](std::string_view e) { return ends(name, e); })) {
         refuse(file, "is no format that is written: name it .nii, .nii.gz, .nrrd, .seg.nrrd, .mha or .mhd");
     }

@@ -21,8 +21,12 @@ struct ExportOptions {
 /// std::runtime_error that lists them.
 void checkExportName(const std::filesystem::path& file);
 
+/// The file beside `file` that holds the voxels: the .raw of an .mhd. Empty for the other formats.
+std::filesystem::path exportedDataOf(const std::filesystem::path& file);
+
 /// Writes a label map in the format that its name asks for: bytes where all labels are under 256, else 16 bits. The file
-/// appears whole or not at all; that of the voxels of an .mhd, a .raw, comes first.
+/// appears whole or not at all; that of the voxels of an .mhd, a .raw, comes first. A .raw that is there is replaced
+/// if the .mhd that is there names it.
 ///
 ///     .nii, .nii.gz   sform, and qform where the axes are at right angles; names and colours as Caret's label table
 ///     .nrrd           gzip

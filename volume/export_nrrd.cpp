@@ -1,5 +1,9 @@
 #include <volume/export_source.h>
 
+#include <volume/import/header_text.h>
+
+#include <fstream>
+
 namespace palpate::volume {
 
 namespace {
@@ -14,16 +18,35 @@ std::string textOf(Vec3 v)
     return fmt::format("{:.17g} {:.17g} {:.17g}", v.x, v.y, v.z);
 }
 
+// Whether the header that is there says that its voxels are in that file.
+bool isDataOf(const std::filesystem::path& header, const std::filesystem::path& raw)
+{
+    constexpr int mostLines = 100;
+    std::ifstream in(header);
+    std::string line;
+    for (int i = 0; i < mostLines && std::getline(in, line); ++i) {
+        if (line == fmt::format("ElementDataFile = {}", raw.filename().string())) {
+            return true;
+        }
+    }
+    return false;
+}
+
 }  // namespace
+
+std::filesystem::path exportedDataOf(const std::filesystem::path& file)
+{
+    return lowerCase(file.extension().string()) == ".mhd" ? std::filesystem::path(file).replace_extension(".raw")
+                                                          : std::filesystem::path();
+}
 
 void writeMeta(const std::filesystem::path& file, const VoxelStream& voxels, const ExportOptions& options)
 {
     const VoxelGrid& grid = voxels.grid;
     const Mat3& m = grid.affine.linear;
     const Vec3 spacing = grid.affine.spacing();
-    const bool apart = file.extension() == ".mhd" || file.extension() == ".MHD";
-    std::filesystem::path raw = file;
-    raw.replace_extension(".raw");
+    const std::filesystem::path raw = exportedDataOf(file);
+    const bool apart = !raw.empty();
     std::string header =
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
         "CompressedData = False\n";
@@ -36,6 +59,8 @@ void writeMeta(const std::filesystem::path& file, const VoxelStream& voxels, con
     header += fmt::format("ElementType = {}\nElementDataFile = {}\n", metaType(voxels.component),
                           apart ? raw.filename().string() : "LOCAL");
     if (apart) {
+        refuseIf(std::filesystem::exists(raw) && !isDataOf(file, raw), raw,
+                 "is there and belongs to another file: choose another name for {}", file.filename().native());
         OutputFile data(raw);
         writeSlices(data, voxels, false, options);
         data.finish();

@@ -23,6 +23,7 @@ struct ImportOptions {
     bool sheared = false;
     int volume = 0;    // which of the volumes of a file with four dimensions, from 1; 0: refuse such a file
     std::string axes;  // where the voxel axes of a file go that does not say it: "LPS", "RAS", ...; "": LPS, with a warning
+    bool axesIfUnsaid = false;  // a file that says it is not refused for `axes`; it keeps its own
     bool renumber = false;                      // values that are no label (negative, over 65535) get free ones
     bool round = false;                         // values within 0.001 of a whole number are taken as that
     bool dicomLabels = false;                   // the values of a DICOM series of CT, MR and the like are labels
@@ -49,6 +50,9 @@ struct ImportedLabels {
     std::vector<Overlap> overlaps;       // a voxel of `lost` is counted once, against the segment that has it now
     std::vector<std::string> warnings;   // geometry that was chosen among several, and the like
     std::vector<Renumbered> renumbered;  // by the value in the file; empty without options.renumber
+
+    /// The value that the file has for a label.
+    std::int64_t originalOf(std::uint16_t value) const noexcept;
 };
 
 /// An intensity image: CT, MR.

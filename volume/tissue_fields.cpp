@@ -339,7 +339,8 @@ void fillFromNearest(const NodeGrid& grid, std::vector<float>& values)
 // The row with most weight in a cell, air when less than half of it is tissue.
 std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lookup)
 {
-    std::array<std::pair<std::uint8_t, double>, 64> rows;
+    std::array<std::uint8_t, 256> rows;  // as many as a table may have; the cell's first `count` are known
+    std::array<double, 256> weights;
     std::size_t count = 0;
     double solid = 0;
     sampler.visitLabels(n, [&](std::uint16_t label, double weight) {
@@ -349,19 +350,21 @@ std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lo
         solid += weight;
         const std::uint8_t row = lookup.row[label];
         std::size_t i = 0;
-        while (i < count && rows[i].first != row) {
+        while (i < count && rows[i] != row) {
             ++i;
         }
         if (i == count) {
-            rows[count++] = {row, 0.0};
+            rows[i] = row;
+            weights[i] = 0.0;
+            ++count;
         }
-        rows[i].second += weight;
+        weights[i] += weight;
     });
     if (solid < 0.5 - 1e-9) {
         return 0;
     }
-    const auto end = rows.begin() + static_cast<std::ptrdiff_t>(count);
-    return std::max_element(rows.begin(), end, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
+    const auto most = std::max_element(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(count));
+    return rows[static_cast<std::size_t>(most - weights.begin())];
 }
 
 template <typename Scale>

@@ -69,12 +69,7 @@ Segment readMask(const Source& source, std::uint16_t value, const ImportOptions&
 void checkSameGrid(const Source& first, const Source& other)
 {
     const bool sameSize = first.size == other.size;
-    double apart = 0;  // [voxels]
-    for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 index = Vec3(first.size - 1) * Vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
-        const Vec3 d = glm::abs(first.affine.toIndex(other.affine.toPatient(index)) - index);
-        apart = std::max({apart, d.x, d.y, d.z});
-    }
+    const double apart = voxelsApart(first.affine, other.affine, first.size);
     if (!sameSize || !(apart < 0.01)) {
         refuse(other.header,
                "is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
@@ -92,7 +87,7 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
     for (std::size_t i = 0; i < files.size(); ++i) {
         Source source = readSource(files[i]);
         chooseVolume(source, options);
-        placeAxes(files[i], source.oriented, options, source.affine, source.warnings);
+        placeAxes(source, options);
         checkAffine(files[i], source.affine, options.sheared, source.warnings);
         if (source.layers > 1) {
             refuse(files[i], "has layers of segments, so it is no mask: name this file alone");
@@ -158,6 +153,8 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
              "holds {} volume files and {} DICOM files: name one of the files, or a folder with one kind", volumes.size(),
              dicom.size());
     if (!dicom.empty()) {
+        refuseAxes(folder, options);
+        refuseVolume(folder, options);
         return labelsApart(folder, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(folder, dicom, o); });
     }

@@ -101,8 +101,8 @@ ImportedLabels vdbLabels(const std::filesystem::path& file, const ImportOptions&
             !fillIf<openvdb::DoubleGrid>(file, *grid, options, out)) {
             refuse(file, "its grid holds {}, not labels: save it as a grid of int32 or float", grid->valueType());
         }
-        checkAffine(file, out.image.affine, false, out.warnings);
-        placeAxes(file, false, options, out.image.affine, out.warnings);
+        checkAffine(file, out.image.affine, options.sheared, out.warnings);
+        placeAxes(options, out.image.affine, out.warnings);
         out.warnings.emplace_back("OpenVDB files do not say their unit: millimetres are assumed");
         return out;
     } catch (const openvdb::Exception& e) {

@@ -95,17 +95,34 @@ void chooseVolume(Source& source, const ImportOptions& options)
     source.volume = source.volumes > 1 ? static_cast<std::uint64_t>(options.volume) - 1 : 0;
 }
 
-void placeAxes(const std::filesystem::path& file, bool oriented, const ImportOptions& options, Affine& affine,
-               std::vector<std::string>& warnings)
+void refuseAxes(const std::filesystem::path& file, const ImportOptions& options)
 {
-    if (oriented) {
-        refuseIf(!options.axes.empty(), file, "--axes {}: it says itself where its axes run: leave --axes out",
-                 options.axes);
-        return;
+    refuseIf(!options.axes.empty() && !options.axesIfUnsaid, file,
+             "--axes {}: it says itself where its axes run: leave --axes out", options.axes);
+}
+
+void refuseVolume(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseIf(options.volume > 1, file, "--volume {}: it holds one volume", options.volume);
+}
+
+void placeAxes(Source& source, const ImportOptions& options)
+{
+    if (source.oriented) {
+        refuseAxes(source.header, options);
+    } else if (source.assumed && options.axes.empty()) {
+        source.affine = *source.assumed;
+    } else {
+        placeAxes(options, source.affine, source.warnings);
     }
+}
+
+void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::string>& warnings)
+{
     if (options.axes.empty()) {
         warnings.emplace_back(
-            "it does not say which side is left: its axes are taken as left, posterior, superior; --axes says otherwise");
+            "it does not say which side is left: its axes are taken as left, posterior, superior; --axes says "
+            "otherwise, of an image --image-axes");
         return;
     }
     const Mat3 frame = frameOf(options.axes);
@@ -163,12 +180,12 @@ ImportedLabels labelsOf(Source source, const ImportOptions& options)
     } else {
         LabelSink sink(source.header, source.size, LabelRules(source.scaled, options));
         decode(source, options.progress, [&](std::span<const double> values) { sink.add(values); });
+        for (SegmentName& s : source.segments) {
+            out.names.push_back(std::move(s.label));
+        }
         sink.finish(source.label, out);
         if (!options.overlap.empty()) {
             out.warnings.emplace_back("--overlap decides nothing: a voxel of it has one label");
-        }
-        for (SegmentName& s : source.segments) {
-            out.names.push_back(std::move(s.label));
         }
     }
     // What the header left to choose comes first.
@@ -180,7 +197,7 @@ Source checkedSource(const std::filesystem::path& file, const ImportOptions& opt
 {
     Source source = readSource(file);
     chooseVolume(source, options);
-    placeAxes(file, source.oriented, options, source.affine, source.warnings);
+    placeAxes(source, options);
     checkAffine(file, source.affine, sheared, source.warnings);
     checkBytes(source);
     for (SegmentName& s : source.segments) {
@@ -202,9 +219,12 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
     }
     checkFile(path);
     if (isVdb(path)) {
+        refuseVolume(path, options);
         return labelsApart(path, "OpenVDB", options, [&](const ImportOptions& o) { return vdbLabels(path, o); });
     }
     if (isDicom(path)) {
+        refuseAxes(path, options);
+        refuseVolume(path, options);
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
@@ -232,6 +252,12 @@ Source readSource(const std::filesystem::path& file)
     return reader(file);
 }
 
+std::int64_t ImportedLabels::originalOf(std::uint16_t value) const noexcept
+{
+    const auto found = std::ranges::find(renumbered, value, &Renumbered::value);
+    return found == renumbered.end() ? value : found->original;
+}
+
 ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptions& options)
 {
     ImportedLabels out = readLabels(path, options);
@@ -253,6 +279,8 @@ ImportedImage importImage(const std::filesystem::path& path, const ImportOptions
     refuseIf(!folder && isVdb(path), path, "is OpenVDB, of which only labels are read: save the image as NIfTI");
     if (folder || isDicom(path)) {
         const Files files = folder ? dicomFilesIn(path) : Files{path};
+        refuseAxes(path, options);
+        refuseVolume(path, options);
         return imageApart(path, dicomLibrary, options, [&](const ImportOptions& o) { return dicomImage(path, files, o); });
     }
     Source source = checkedSource(path, options, true);

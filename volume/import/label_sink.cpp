@@ -166,12 +166,16 @@ void LabelSink::refuseOdd(bool surelyLabels) const
            outside_->voxel, outside_->value);
 }
 
-// The labels of codes: values from 0 to 65535 stay, others take the lowest that are free, in rising order.
+// The labels of codes: values from 0 to 65535 stay, others take the lowest that are free, in rising order. One that the file
+// names is not free, though no voxel has it.
 std::vector<std::uint16_t> LabelSink::decoded(ImportedLabels& out) const
 {
     std::vector<std::uint16_t> labelOf(values_.size());
     std::vector<bool> used(65536, false);
     used[0] = true;
+    for (const LabelName& named : out.names) {
+        used[named.value] = true;
+    }
     for (const auto& [value, code] : codes_) {
         if (value >= 0 && value <= 65535) {
             labelOf[code] = static_cast<std::uint16_t>(value);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <map>
+#include <utility>
 
 namespace palpate::volume {
 
@@ -62,12 +63,15 @@ Source readMgh(const std::filesystem::path& file)
         }
         centre[axis] = placed ? number(78 + 4 * a) : 0.0;
     }
-    if (!placed) {
-        source.warnings.emplace_back("its header gives no place: FreeSurfer's coronal axes and voxels of 1 mm are assumed");
-    }
     const Vec3 flip(-1e-3, -1e-3, 1e-3);
     source.affine = {Mat3(linear[0] * flip, linear[1] * flip, linear[2] * flip),
                      (centre - linear * (0.5 * Vec3(source.size))) * flip};
+    if (!placed) {
+        source.warnings.emplace_back(
+            "its header gives no place: voxels of 1 mm are assumed, and FreeSurfer's coronal axes unless --axes says otherwise");
+        source.oriented = false;
+        source.assumed = std::exchange(source.affine, {Mat3(1e-3), -0.5e-3 * Vec3(source.size)});
+    }
     source.trailer = std::uint64_t{1} << 20;  // scanner parameters and tags
     return source;
 }

@@ -94,11 +94,18 @@ Affine sform(const NiftiHeader& header, double unit)
     return toPatient(linear, origin, unit);
 }
 
-Affine qform(const NiftiHeader& header, double unit)
+// No rotation where the three parts of the quaternion that are stored are longer than one.
+std::optional<Affine> qform(const NiftiHeader& header, double unit)
 {
-    const double b = header.quaternion(0);
-    const double c = header.quaternion(1);
-    const double d = header.quaternion(2);
+    constexpr double rounding = 1e-4;
+    const double stored = std::hypot(header.quaternion(0), header.quaternion(1), header.quaternion(2));
+    if (!(stored <= 1.0 + rounding)) {
+        return std::nullopt;
+    }
+    const double scale = 1.0 / std::max(1.0, stored);
+    const double b = scale * header.quaternion(0);
+    const double c = scale * header.quaternion(1);
+    const double d = scale * header.quaternion(2);
     const double a = std::sqrt(std::max(0.0, 1.0 - b * b - c * c - d * d));
     const double handed = header.pixdim(0) < 0 ? -1.0 : 1.0;
     Mat3 r(a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c),  //
@@ -107,7 +114,7 @@ Affine qform(const NiftiHeader& header, double unit)
     r[0] *= std::abs(header.pixdim(1));
     r[1] *= std::abs(header.pixdim(2));
     r[2] *= std::abs(header.pixdim(3)) * handed;
-    return toPatient(r, {header.quaternion(3), header.quaternion(4), header.quaternion(5)}, unit);
+    return toPatient(r, Vec3(header.quaternion(3), header.quaternion(4), header.quaternion(5)), unit);
 }
 
 // Metres in the file's unit of length.
@@ -124,18 +131,6 @@ double unitOf(const std::filesystem::path& file, const NiftiHeader& header)
         default:
             refuse(file, "xyzt_units = {}: the unit of length is unknown, save it again", header.units());
     }
-}
-
-// How far two placements of the same voxels are apart at most, in voxels of `a`.
-double disagreement(const Affine& a, const Affine& b, Index3 size)
-{
-    double most = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const Vec3 index = Vec3(size - 1) * Vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
-        const Vec3 apart = glm::abs(a.toIndex(b.toPatient(index)) - index);
-        most = std::max({most, apart.x, apart.y, apart.z});
-    }
-    return most;
 }
 
 // Spacings alone: the header does not say where the axes run.
@@ -157,18 +152,18 @@ void placeNifti(const NiftiHeader& header, Source& source)
     }
     const double unit = unitOf(source.header, header);
     const bool hasQ = header.qformCode() > 0;
-    const Affine q = qform(header, unit);
+    const std::optional<Affine> q = qform(header, unit);
     const Affine s = sform(header, unit);
     bool hasS = header.sformCode() > 0;
     // A writer that sets the code and forgets the matrix.
     const bool empty = s.linear == Mat3(0.0);
-    if (hasS && empty && hasQ && q.voxelVolume() > 0) {
+    if (hasS && empty && hasQ && q && q->voxelVolume() > 0) {
         hasS = false;
         source.warnings.emplace_back("its sform is all zero, though it has a code: the qform is used");
     }
     if (hasS) {
         source.affine = s;
-        const double apart = s.voxelVolume() > 0 && hasQ ? disagreement(s, q, source.size) : 0.0;
+        const double apart = s.voxelVolume() > 0 && hasQ && q ? voxelsApart(s, *q, source.size) : 0.0;
         if (!(apart <= 0.1)) {
             source.warnings.push_back(
                 fmt::format("its qform and sform disagree by up to {:.1f} voxels: the sform is used", apart));
@@ -183,7 +178,8 @@ void placeNifti(const NiftiHeader& header, Source& source)
                        header.pixdim(k));
             }
         }
-        source.affine = q;
+        refuseIf(!q, source.header, "the quaternion of its qform is longer than one, so it is no rotation: save it again");
+        source.affine = *q;
         return;
     }
     placePlain(header, source);

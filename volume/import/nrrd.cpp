@@ -267,6 +267,19 @@ std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
     return segments;
 }
 
+// The two characters that the format escapes in the value of a key.
+std::string withoutEscapes(const std::string& text)
+{
+    std::string out;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char next = text[i] == '\\' && i + 1 < text.size() ? text[i + 1] : '\0';
+        const bool escaped = next == '\\' || next == 'n';
+        out += !escaped ? text[i] : next == 'n' ? '\n' : '\\';
+        i += escaped ? 1 : 0;
+    }
+    return out;
+}
+
 NrrdHeader readNrrdHeader(const std::filesystem::path& file)
 {
     constexpr std::uint64_t longest = std::uint64_t{16} << 20;
@@ -288,7 +301,7 @@ NrrdHeader readNrrdHeader(const std::filesystem::path& file)
             continue;
         }
         if (pair != std::string::npos && (colon == std::string::npos || pair < colon)) {
-            header.pairs[text.substr(0, pair)] = text.substr(pair + 2);
+            header.pairs[text.substr(0, pair)] = withoutEscapes(text.substr(pair + 2));
         } else if (colon != std::string::npos) {
             const std::string name = lowerCase(text.substr(0, colon));
             refuseIf(!header.fields.emplace(name, trimmed(text.substr(colon + 2))).second, file,

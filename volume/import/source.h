@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -60,6 +61,7 @@ struct Source {
     std::uint64_t volume = 0;       // the one that is read
     std::string dimensions;         // all sizes, where there are volumes
     bool oriented = true;           // the header says where the voxel axes go
+    std::optional<Affine> assumed;  // else: its place as the program of that format assumes it, where --axes is not given
     bool label = false;             // the file says itself that it is a label map
     std::vector<SegmentName> segments;
     std::vector<std::string> warnings;
@@ -114,10 +116,17 @@ Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_
 /// Picks options.volume of a source with four dimensions, or refuses it; the layers of a .seg.nrrd count as volumes then.
 void chooseVolume(Source& source, const ImportOptions& options);
 
-/// Where the voxel axes go that a header does not say: options.axes, else left, posterior, superior, with a warning.
-/// The one rule for all formats.
-void placeAxes(const std::filesystem::path& file, bool oriented, const ImportOptions& options, Affine& affine,
-               std::vector<std::string>& warnings);
+/// Where the voxel axes go that a header does not say: options.axes, else where the program of that format assumes them, else
+/// left, posterior, superior, with a warning. The one rule for all formats.
+void placeAxes(Source& source, const ImportOptions& options);
+/// The same of axes that a file never says.
+void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::string>& warnings);
+/// Refuses options.axes for a file that says where its axes run, and options.volume for one that can hold one volume alone.
+void refuseAxes(const std::filesystem::path& file, const ImportOptions& options);
+void refuseVolume(const std::filesystem::path& file, const ImportOptions& options);
+
+/// How far two placements of the same voxels are apart at most, in voxels of `a`.
+double voxelsApart(const Affine& a, const Affine& b, Index3 size);
 
 /// Refuses spacings that are not positive and finite, and sheared axes unless `sheared`, which leave a warning.
 void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings);

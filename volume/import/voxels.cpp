@@ -189,6 +189,17 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
     warnings.push_back(said);
 }
 
+double voxelsApart(const Affine& a, const Affine& b, Index3 size)
+{
+    double most = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 index = Vec3(size - 1) * Vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+        const Vec3 apart = glm::abs(a.toIndex(b.toPatient(index)) - index);
+        most = std::max({most, apart.x, apart.y, apart.z});
+    }
+    return most;
+}
+
 void makeFinite(const std::filesystem::path& file, std::vector<float>& values, std::vector<std::string>& warnings)
 {
     float lowest = std::numeric_limits<float>::infinity();

@@ -469,7 +469,7 @@ std::vector<PreparationStep> bodyFromHull(LabelImage& image, std::vector<LabelNa
     }
     base::failIf(std::find(organs.begin(), organs.end(), 1) == organs.end(), "{}: no voxel has a label of tissue", option);
     Mask hull = dilated(grid, organs, thickness);
-    fillHolesBySlices(grid, hull, std::numeric_limits<double>::infinity());
+    fillHolesBySlices(grid, hull);
     const Vec3 spacing = image.affine.spacing();
     const double depth = std::max({skinThickness, spacing.x, spacing.y, spacing.z});
     const Mask inner = eroded(grid, hull, depth);

@@ -201,8 +201,7 @@ public:
     FoundLabel tissueOf(std::uint16_t value) const
     {
         const LabelName* own = find(labels_.names, value);
-        // A value that --renumber gave says nothing about what the label is.
-        const LabelName* mapped = originalOf(value) == value ? find(map_.labels, value) : nullptr;
+        const LabelName* mapped = inMap(value);
         FoundLabel found;
         found.label = own != nullptr ? *own : LabelName{value, "", ""};
         std::string& name = found.label.name;
@@ -210,7 +209,7 @@ public:
             name = mapped->name;
         }
         if (name.empty()) {
-            name = value == 0 ? "outside" : fmt::format("label {}", originalOf(value));
+            name = value == 0 ? "outside" : fmt::format("label {}", labels_.originalOf(value));
         }
         for (const Setting& s : settings_) {
             if (fits(s, value)) {
@@ -237,8 +236,8 @@ private:
     bool fits(const Setting& s, std::uint16_t value) const
     {
         const LabelName* own = find(labels_.names, value);
-        const LabelName* mapped = originalOf(value) == value ? find(map_.labels, value) : nullptr;
-        return s.names(originalOf(value), own != nullptr ? own->name : mapped != nullptr ? mapped->name : "");
+        const LabelName* mapped = inMap(value);
+        return s.names(labels_.originalOf(value), own != nullptr ? own->name : mapped != nullptr ? mapped->name : "");
     }
 
     // Two settings of one label, perhaps by its name and by its value, have to agree.
@@ -252,18 +251,17 @@ private:
                 }
                 if (first != nullptr && first->tissue != s.tissue) {
                     throw base::error("--set {} and --set {}: both name label {}: leave one out", first->text, s.text,
-                                      originalOf(value));
+                                      labels_.originalOf(value));
                 }
                 first = &s;
             }
         }
     }
 
-    std::int64_t originalOf(std::uint16_t value) const
+    // A value that --renumber gave says nothing about what the label is.
+    const LabelName* inMap(std::uint16_t value) const
     {
-        const auto found = std::find_if(labels_.renumbered.begin(), labels_.renumbered.end(),
-                                        [&](const volume::Renumbered& r) { return r.value == value; });
-        return found == labels_.renumbered.end() ? value : found->original;
+        return labels_.originalOf(value) == value ? find(map_.labels, value) : nullptr;
     }
 
     // A map that calls a label something else than the file does, and makes something else of it, is the map of another
@@ -273,7 +271,7 @@ private:
         std::vector<std::string> list;
         for (const auto& [value, voxels] : counts) {
             const LabelName* own = find(labels_.names, value);
-            const LabelName* mapped = find(map_.labels, value);
+            const LabelName* mapped = inMap(value);
             if (value == 0 || own == nullptr || mapped == nullptr || mapped->name.empty() ||
                 sameName(mapped->name, own->name)) {
                 continue;
@@ -285,7 +283,7 @@ private:
                 byName.certain = true;
             }
             const bool said =
-                std::ranges::any_of(settings_, [&, v = value](const Setting& s) { return s.names(v, own->name); });
+                std::ranges::any_of(settings_, [&, v = labels_.originalOf(value)](const Setting& s) { return s.names(v, own->name); });
             if (!said && byName.certain && byName.label.tissue != mapped->tissue) {
                 list.push_back(fmt::format("{} is '{}' ({}) in the file and '{}' ({}) in the map", value, own->name,
                                            byName.label.tissue, mapped->name, mapped->tissue));
@@ -440,7 +438,13 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
     const Mapper mapper(options, file, labels, counts, table, notes);
     LabelMap map{file.stem().string(), {}, {}};
     std::set<std::uint16_t> open;
+    std::string further;
     for (const auto& [value, voxels] : counts) {
+        if (const std::int64_t original = labels.originalOf(value); original != value) {
+            further += fmt::format("# A label map has values from 0 to 65535. For the label {} give --set {}=TISSUE.\n", original,
+                                   original);
+            continue;
+        }
         FoundLabel found = mapper.tissueOf(value);
         if (value == 0 && found.label.tissue.empty()) {
             continue;
@@ -454,7 +458,7 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
     std::string text =
         fmt::format("# Which tissue each label of {} is: replace every \"?\" by a row of the tissue table.\n",
                     file.filename().string());
-    base::writeWhole(options.writeMap, text + datasets::labelMapText(map));
+    base::writeWhole(options.writeMap, text + further + datasets::labelMapText(map));
     return open.size();
 }
 

@@ -20,7 +20,6 @@ using volume::VoxelGrid;
 struct Slice {
     std::size_t first = 0, right = 0, down = 0;  // offset of pixel (0, 0), and steps along its axes
     int width = 0, height = 0;
-    double pixel = 0;  // area [m^2]
 
     std::size_t voxel(std::size_t at) const noexcept
     {
@@ -37,9 +36,7 @@ Slice sliceOf(const VoxelGrid& grid, int axis, int number)
     Index3 along(0), right(0), down(0);
     along[axis] = number;
     right[u] = down[v] = 1;
-    const Vec3 spacing = grid.affine.spacing();
-    return {places.offset(along), places.offset(right), places.offset(down),
-            grid.size[u],         grid.size[v],         spacing[u] * spacing[v]};
+    return {places.offset(along), places.offset(right), places.offset(down), grid.size[u], grid.size[v]};
 }
 
 // A region of pixels that hang together by edges.
@@ -254,13 +251,13 @@ Mask outsideBySlices(const VoxelGrid& grid, const Mask& mask, const std::vector<
     return out;
 }
 
-void fillHolesBySlices(const VoxelGrid& grid, Mask& mask, double area)
+void fillHolesBySlices(const VoxelGrid& grid, Mask& mask)
 {
     forEachSlice(grid, [&](const Slice& slice) {
         forEachRegion(
             slice, [&](std::size_t voxel) { return mask[voxel] == 0; },
             [&](const Region& region) {
-                if (region.border || static_cast<double>(region.pixels.size()) * slice.pixel > area) {
+                if (region.border) {
                     return;
                 }
                 for (const std::size_t at : region.pixels) {

@@ -48,7 +48,7 @@ int axialAxis(const volume::Affine& affine) noexcept;
 /// @param below  a region with less than half of its image below it is a lung that the field of view cuts: it stays inside
 Mask outsideBySlices(const volume::VoxelGrid& grid, const Mask& mask, const std::vector<float>& image, float below);
 
-/// Adds to the set what it encloses in an axial slice, where that is no larger than `area` [m^2].
-void fillHolesBySlices(const volume::VoxelGrid& grid, Mask& mask, double area);
+/// Adds to the set what it encloses in an axial slice.
+void fillHolesBySlices(const volume::VoxelGrid& grid, Mask& mask);
 
 }  // namespace palpate::prepare

@@ -135,17 +135,6 @@ std::string joined(std::vector<std::string> list)
                        all > maxRowsListed ? fmt::format("; and {} more", all - maxRowsListed) : "");
 }
 
-// The value that the file has for a label.
-std::int64_t originalOf(const volume::ImportedLabels& labels, std::uint16_t value)
-{
-    for (const volume::Renumbered& r : labels.renumbered) {
-        if (r.value == value) {
-            return r.original;
-        }
-    }
-    return value;
-}
-
 // The entry of a value, checked for being the only one.
 const NameTable::Entry* entryOf(const NameTable& table, std::int64_t value)
 {
@@ -169,7 +158,7 @@ void apply(const NameTable& table, const std::filesystem::path& file, const Labe
     std::vector<std::string> contradictions, missing;
     std::size_t given = 0;
     for (const auto& [value, voxels] : counts) {
-        const std::int64_t original = originalOf(labels, value);
+        const std::int64_t original = labels.originalOf(value);
         const NameTable::Entry* entry = value == 0 ? nullptr : entryOf(table, original);
         if (entry == nullptr) {
             if (value != 0) {

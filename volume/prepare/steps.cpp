@@ -155,8 +155,9 @@ private:
             first = glm::min(first, n);
             last = glm::max(last, n);
         }
-        return std::pair(Index3(glm::ceil(glm::max(first - 1e-6, Vec3(-1.0)))),
-                         Index3(glm::floor(glm::min(last + 1e-6, Vec3(image_.size)))));
+        // No whole number can be made of a place that is far away.
+        const auto near = [&](Vec3 n) { return glm::clamp(n, Vec3(-1.0), Vec3(image_.size)); };
+        return std::pair(Index3(glm::ceil(near(first - 1e-6))), Index3(glm::floor(near(last + 1e-6))));
     }
 
     // Where the voxels are, for a message.

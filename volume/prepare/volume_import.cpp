@@ -30,6 +30,8 @@ volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>
     volume::ImportOptions reading;
     reading.series = o.reading.series;
     reading.volume = o.imageVolume;
+    reading.axes = o.imageAxes.empty() ? o.reading.axes : o.imageAxes;
+    reading.axesIfUnsaid = o.imageAxes.empty();
     tell("checking the image", {});
     reading.progress = [&](double fraction) { tell("reading the image", fraction); };
     volume::ImportedImage image = volume::importImage(o.image, reading);
@@ -178,6 +180,7 @@ void checkRequest(const ImportRequest& o)
     base::failIf(o.bodyFromImage && o.image.empty(), "--body-from-image: needs the image: add --image FILE");
     base::failIf(!o.imageUnit.empty() && o.image.empty(), "--image-unit: needs the image: add --image FILE");
     base::failIf(o.imageVolume > 0 && o.image.empty(), "--image-volume: needs the image: add --image FILE");
+    base::failIf(!o.imageAxes.empty() && o.image.empty(), "--image-axes: needs the image: add --image FILE");
     std::error_code none;
     base::failIf(!o.reading.series.empty() && fs::exists(o.input, none) && !fs::is_directory(o.input, none) &&
                      !fs::is_directory(o.image, none),

@@ -20,6 +20,7 @@ struct ImportRequest {
     std::string stiffness;          // stiffness map, see datasets::stiffnessMap(); empty: the image changes nothing
     std::string imageUnit;          // "HU", where the image's file does not say so
     int imageVolume = 0;            // of an image with four dimensions, from 1
+    std::string imageAxes;          // where the image's axes go, if its file does not say it; empty: as reading.axes
     volume::ImportOptions reading;  // of the labels
     MappingOptions mapping;         // of labels to tissues
     PreparationOptions steps;       // done to the labels
