@@ -3,6 +3,7 @@
 #include <tests/apps/program.h>
 #include <volume/export.h>
 #include <volume/import.h>
+#include <volume/tissue.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -91,6 +92,35 @@ TEST_F(ImportOptions, ValuesThatAreNoLabelsAreRenumberedForWhoAsks)
     refused(file, {"--renumber", "--map", "brats", "--set", "1=fat"}, "'label 70000'");
 }
 
+// The header names 1 and 3, and no voxel has 1 or 2: 70000 must not become what the header calls 1.
+TEST_F(ImportOptions, ARenumberedValueTakesNoNameOfAnother)
+{
+    const std::string head =
+        "NRRD0004\ntype: int\ndimension: 3\nspace: LPS\nsizes: 2 3 4\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n"
+        "endian: little\nencoding: raw\nSegment0_ID:=a\nSegment0_Name:=spleen\nSegment0_LabelValue:=1\nSegment0_Layer:=0\n"
+        "Segment1_ID:=b\nSegment1_Name:=liver\nSegment1_LabelValue:=3\nSegment1_Layer:=0\n\n";
+    std::vector<std::int32_t> values(24, 3);
+    values[5] = 70000;
+    const std::string file = write("two.seg.nrrd", head + std::string(reinterpret_cast<const char*>(values.data()), 96));
+    refused(file, {"--renumber"}, "'label 70000'");
+    const auto labels = taken(file, {"--renumber", "--set", "70000=bone"}).at("labels");
+    ASSERT_EQ(labels.size(), 2U);
+    EXPECT_EQ(labels[0].at("name"), "label 70000");
+    EXPECT_EQ(labels[0].at("tissue"), "bone");
+    EXPECT_EQ(labels[1].at("tissue"), "liver");
+
+    // Nor does a map of the file hold it, or contradict a table of names for it.
+    const std::string map = folder / "m.toml";
+    EXPECT_EQ(palpate({"import", file, "--renumber", "--write-map", map}).status, 0);
+    EXPECT_NE(readText(map).find("--set 70000=TISSUE"), std::string::npos);
+    EXPECT_EQ(readText(map).find("label 70000\""), std::string::npos);
+    EXPECT_EQ(taken(file, {"--renumber", "--map", map, "--set", "70000=bone"}).at("labels").size(), 2U);
+    const std::string bare = write("bare.mha", metaImage<std::int32_t>("MET_INT", {70000})),
+                      names = write("names.ctbl", "1 fat 1 2 3 255\n70000 liver 1 2 3 255\n");
+    EXPECT_EQ(taken(bare, {"--renumber", "--names", names, "--map", "totalsegmentator", "--set", "1=fat"}).at("labels").size(),
+              2U);
+}
+
 TEST_F(ImportOptions, NearlyWholeValuesAreRoundedForWhoAsks)
 {
     const std::string file = write("near.mha", metaImage<float>("MET_FLOAT", {0.99999994F, 2.0003F})),
@@ -125,6 +155,42 @@ TEST_F(ImportOptions, AxesAreSaidWhereTheFileDoesNot)
     EXPECT_FALSE(warns(j, "which side is left"));
     refused(file, with({"--axes", "RLA"}), "must be three letters");
     refused(one, with({"--axes", "RAS"}), "leave --axes out");
+}
+
+// Both files leave their axes open. The image has 1000 where the label is 2, and the stiffness map doubles there.
+TEST_F(ImportOptions, AnImageThatDoesNotSayItsAxesHasThoseOfTheLabels)
+{
+    const std::string centred = "Offset = -0.5 -2 -4.5\n",
+                      labels = write("bare.mha", metaImage<std::uint8_t>("MET_UCHAR", {1, 2, 1, 2, 1, 2}, centred.c_str())),
+                      image = write("ct.mha", metaImage<float>("MET_FLOAT", {1, 1000, 1, 1000, 1, 1000}, centred.c_str())),
+                      said = write("said.mha", metaImage<float>("MET_FLOAT", {1, 1000, 1, 1000, 1, 1000},
+                                                                 (centred + "TransformMatrix = 1 0 0 0 1 0 0 0 1\n").c_str()));
+    const auto valueIn = [&](const Arguments& more) {
+        EXPECT_EQ(palpate(import(labels, with(more))).status, 0);
+        const volume::Tissue tissue = volume::Tissue::load(vdb);
+        fs::remove(vdb);
+        const std::vector<std::uint16_t> label = tissue.labels().values;
+        const std::vector<float> value = tissue.companion()->values;
+        double sum = 0, count = 0;
+        for (std::size_t i = 0; i < label.size(); ++i) {
+            sum += label[i] == 2 ? static_cast<double>(value[i]) : 0.0;
+            count += label[i] == 2 ? 1 : 0;
+        }
+        return sum / count;
+    };
+    EXPECT_DOUBLE_EQ(valueIn({"--image", image}), 1000.0);
+    EXPECT_DOUBLE_EQ(valueIn({"--image", image, "--axes", "RAS"}), 1000.0);
+    EXPECT_DOUBLE_EQ(valueIn({"--image", image, "--axes", "RAS", "--image-axes", "LPS"}), 1.0);
+    EXPECT_DOUBLE_EQ(valueIn({"--image", said, "--axes", "RAS"}), 1.0) << "it says its own";
+    refused(labels, with({"--image", said, "--image-axes", "RAS"}), "leave --axes out");
+    refused(labels, with({"--image-axes", "RAS"}), "--image-axes: needs the image: add --image FILE");
+}
+
+TEST_F(ImportOptions, ABoxFarAwayHoldsNothing)
+{
+    for (const char* box : {"1e6,2e6,-1000,1000,-1000,1000", "3e9,4e9,-1000,1000,-1000,1000", "-1e300,-1e299,0,9,0,9"}) {
+        refused(one, with({"--crop", box}), "no voxel lies there");
+    }
 }
 
 TEST_F(ImportOptions, WhatIsOnlyOfDicomDoesNotPassInSilence)

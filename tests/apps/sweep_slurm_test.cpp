@@ -32,11 +32,11 @@ int workerOn(const std::string& folder)
     return 0;
 }
 
-std::size_t submissionsOf(const std::string& folder)
+std::size_t filesOf(const std::string& folder, const char* ending)
 {
     std::size_t count = 0;
     for (const auto& entry : fs::directory_iterator(folder + "/slurm")) {
-        count += entry.path().extension() == ".sh" ? 1 : 0;
+        count += entry.path().extension() == ending ? 1 : 0;
     }
     return count;
 }
@@ -50,7 +50,7 @@ TEST(SweepOnSlurm, ItsTableIsThatOfOneMachineAlsoWhenATaskIsKilled)
         GTEST_SKIP() << "no Slurm to test with: " << slurm.problem();
     }
     const Folder here;
-    const std::string plan = here / "p.toml", local = here / "local", cluster = here / "cluster";
+    const std::string plan = here / "p.toml", local = here / "local", cluster = here / "100% of a cluster";
     writeText(plan, shortPlan(8));
     figures({"sweep", plan, "-o", local, "--jobs", "2"});
 
@@ -73,7 +73,8 @@ TEST(SweepOnSlurm, ItsTableIsThatOfOneMachineAlsoWhenATaskIsKilled)
     EXPECT_TRUE(killed) << "no task was there to be killed";
     const Outcome outcome = sweep.wait();
     EXPECT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_GE(submissionsOf(cluster), 2U) << "what was lost must be submitted again";
+    EXPECT_GE(filesOf(cluster, ".sh"), 2U) << "what was lost must be submitted again";
+    EXPECT_GT(filesOf(cluster, ".log"), 0U) << "of tasks";
     const json done = json::parse(readText(here / "f.json"));
     EXPECT_EQ(done["done"], 96);
     EXPECT_EQ(done["failed"], 0);

@@ -145,6 +145,8 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "outputs = [\"a = totall / 2\"]\n" + axis("dffb.gain", "[1]"), "formula"},
         {scene + "constraints = [\"dffb_gain > \"]\n" + axis("dffb.gain", "[1]"), "formula"},
         {scene + "constraints = [\"dffb_gain > 2\"]\n" + axis("dffb.gain", "[1]"), "no point is left"},
+        {scene + "constraints = [\"point < 3\"]\n" + axis("dffb.gain", "[1]"), "point"},
+        {scene + "constraints = [\"seed > 0\"]\n" + axis("dffb.gain", "[1]"), "seed"},
         {scene + "constraints = [\"dffb_gain > 2\"]\n[design]\nkind = \"morris\"\nsamples = 2\n" + axis("dffb.gain", "[1]"),
          "whole or none"},
         {"scene = \"moon\"\n" + axis("dffb.gain", "[1]"), "built-in scenes are"},

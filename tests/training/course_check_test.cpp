@@ -6,7 +6,12 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
 #include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
 
 namespace palpate::training {
 namespace {
@@ -73,6 +78,25 @@ TEST(CourseCheck, AFileWhoseWritersAreKilledIsWhole)
     EXPECT_EQ(check.kills, 10);
     EXPECT_GE(check.sessions, 100U) << "and goes on to the end of the courses";
     EXPECT_TRUE(check.faults.empty()) << check.faults.front();
+}
+
+// No file may grow: what cannot be stored must end the check, not go on for ever.
+TEST(CourseCheck, AFileThatCannotBeWrittenEndsTheCheck)
+{
+    const tests::Folder folder;
+    const auto check = [&] {
+        std::signal(SIGXFSZ, SIG_IGN);
+        const rlimit most{200 << 10, 200 << 10};
+        ::setrlimit(RLIMIT_FSIZE, &most);
+        try {
+            checkKills(breastCourse(), folder.path(), 1000, 3);
+        } catch (const std::exception& e) {
+            std::fputs(e.what(), stderr);
+            std::_Exit(3);
+        }
+        std::_Exit(0);
+    };
+    EXPECT_EXIT(check(), ::testing::ExitedWithCode(3), "cannot be stored there");
 }
 
 }  // namespace

@@ -109,7 +109,7 @@ TEST(Xapi, StatementsAreWholeAndTheSameAgain)
     EXPECT_EQ(textOf(folder / "a.json"), textOf(folder / "b.json"));
     const auto statements = nlohmann::json::parse(textOf(folder / "a.json"));
     ASSERT_EQ(statements.size(), somebody.people[0].sessions.size());
-    const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"), iri("[a-z]+:.+");
+    const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"), iri("[a-z]+:[A-Za-z0-9._~:/%-]+");
     std::set<std::string> ids;
     for (std::size_t i = 0; i < statements.size(); ++i) {
         const auto& s = statements[i];
@@ -123,6 +123,19 @@ TEST(Xapi, StatementsAreWholeAndTheSameAgain)
         EXPECT_EQ(s["result"]["success"], met);
         EXPECT_TRUE(s["verb"]["id"].get<std::string>().ends_with(met ? "passed" : "failed"));
     }
+}
+
+TEST(Xapi, NamesWithBlanksMakeNoWrongIri)
+{
+    const tests::Folder folder;
+    Somebody somebody("P-07");
+    auto& sessions = somebody.people[0].sessions;
+    sessions.resize(1);
+    sessions[0].exercise = sessions[0].caseId = "";
+    sessions[0].scene = "my scene/Leber \xc3\xbc";
+    writeXapi(folder / "a.json", somebody.people);
+    EXPECT_EQ(nlohmann::json::parse(textOf(folder / "a.json"))[0]["object"]["id"],
+              "urn:palpate:case:my%20scene%2FLeber%20%C3%BC");
 }
 
 }  // namespace

@@ -192,8 +192,8 @@ TEST(Export, NamesColoursAndTermsOfSegmentsAreKept)
     image.values[image.offset({8, 7, 6})] = 200;
     const std::vector<LabelName> named{{5, "left \"lung\"", "lung", std::array<std::uint8_t, 3>{12, 255, 0},
                                         "c~SCT^123037004^Anatomical Structure~SCT^39607008^Lung~SCT^7771000^Left~a~^^~^^"},
-                                       {9, "nowhere", "fat"},
-                                       {200, "M\xc3\xbcller's duct", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
+                                       {9, "now\\here", "fat"},
+                                       {200, "M\xc3\xbcller's \\duct\\n", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
     for (const std::string ending : {".seg.nrrd", ".nii.gz"}) {
         SCOPED_TRACE(ending);
         const std::string file = folder / ("s" + ending);
@@ -267,6 +267,15 @@ TEST(Export, RefusesOnOneLineAndLeavesNothing)
     EXPECT_THROW(exportImage(folder / "a.seg.nrrd", {image.size, image.affine}, std::vector<float>(27)),
                  std::runtime_error);
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+
+    // The voxels of an .mhd lie beside it, in a file that may be another's.
+    std::ofstream(folder / "ct.raw") << "of ct.nhdr";
+    EXPECT_NE(errorOf(folder / "ct.mhd").find("is there and belongs to another file"), std::string::npos);
+    EXPECT_EQ(std::filesystem::file_size(folder / "ct.raw"), 10U);
+    EXPECT_FALSE(std::filesystem::exists(folder / "ct.mhd"));
+    std::filesystem::remove(folder / "ct.raw");
+    EXPECT_EQ(errorOf(folder / "ct.mhd"), "no error");
+    EXPECT_EQ(errorOf(folder / "ct.mhd"), "no error") << "its own is replaced";
 }
 
 }  // namespace

@@ -283,6 +283,17 @@ TEST_F(ImportFile, FreeSurferVolumesComeIn)
     EXPECT_NEAR(glm::length(a.linear[1] - Vec3(0, 0, -2e-3)), 0, 1e-9);  // down
     EXPECT_NEAR(glm::length(a.linear[2] - Vec3(0, -3e-3, 0)), 0, 1e-9);  // to the front
     EXPECT_NEAR(glm::length(a.toPatient({2, 2.5, 3}) - Vec3(-10e-3, -20e-3, 30e-3)), 0, 1e-9);
+
+    // Without a place the program assumes one, and --axes goes before that.
+    put(28, std::int16_t{0});
+    const fs::path open = write("open.mgz", gzip(bytes + bytesOf(ramp<std::uint8_t>())));
+    const auto assumed = importLabels(open);
+    EXPECT_NEAR(glm::length(assumed.image.affine.linear[1] - Vec3(0, 0, -1e-3)), 0, 1e-9);
+    ASSERT_EQ(assumed.warnings.size(), 1U);
+    EXPECT_NE(assumed.warnings[0].find("FreeSurfer's coronal axes unless --axes says otherwise"), std::string::npos);
+    ImportOptions options;
+    options.axes = "RAS";
+    EXPECT_NEAR(glm::length(importLabels(open, options).image.affine.linear[1] - Vec3(0, -1e-3, 0)), 0, 1e-9);
 }
 
 // An inflated stream whose end falls onto the end of a buffer is not a short one.

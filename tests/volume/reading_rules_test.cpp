@@ -149,6 +149,21 @@ TEST_F(ReadingRules, FilesThatDoNotSayWhichSideIsLeftAreTreatedAlike)
     EXPECT_TRUE(importLabels(write("rai.mha", smallMeta("AnatomicalOrientation = RAI\n") + data)).warnings.empty());
 }
 
+// A rotation has a quaternion of length one, of which three parts are stored.
+TEST_F(ReadingRules, AQuaternionLongerThanOneIsNoRotation)
+{
+    const auto turned = [&](float b, float c) {
+        NiftiFields nifti(2, 8);
+        nifti.put(252, std::int16_t{1}).put(256, b).put(260, c);
+        return write("q.nii", nifti.bytes + bytesOf(smallRamp<std::uint8_t>()));
+    };
+    const float half = std::sqrt(0.5F);
+    EXPECT_NEAR(importLabels(turned(half, half)).image.affine.voxelVolume(), 6e-9, 1e-14);
+    EXPECT_NEAR(importLabels(turned(1.00005F * half, half)).image.affine.voxelVolume(), 6e-9, 1e-14) << "rounding";
+    EXPECT_NE(reason(turned(1, 1)).find("is longer than one"), std::string::npos);
+    EXPECT_NE(reason(turned(std::nanf(""), 0)).find("is longer than one"), std::string::npos);
+}
+
 TEST_F(ReadingRules, AnSformOfZerosGivesWayToAGoodQform)
 {
     const std::string data = bytesOf(smallRamp<std::uint8_t>());
