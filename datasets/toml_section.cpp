@@ -216,6 +216,19 @@ std::optional<std::string> Section::word(std::string_view key)
     return node->as_string()->get();
 }
 
+std::vector<std::string> Section::words(std::string_view key)
+{
+    std::vector<std::string> out;
+    const toml::node* const list = find(key);
+    refuseIf(list != nullptr && !list->is_array(), key, "must be a list of texts in quotes");
+    for (std::size_t i = 0; list != nullptr && i < list->as_array()->size(); ++i) {
+        const auto text = list->as_array()->get(i)->value_exact<std::string>();
+        refuseIf(!text || text->empty(), key, "must be a list of texts in quotes, none of them empty");
+        out.push_back(*text);
+    }
+    return out;
+}
+
 std::optional<std::size_t> Section::choice(std::string_view key, std::span<const std::string_view> choices)
 {
     const std::optional<std::string> value = word(key);

@@ -34,6 +34,8 @@ public:
     std::optional<bool> flag(std::string_view key);
     /// Text that is not empty.
     std::optional<std::string> word(std::string_view key);
+    /// The texts of a list, none of them empty; no text where the key is missing.
+    std::vector<std::string> words(std::string_view key);
     /// Index of the value in `choices`.
     std::optional<std::size_t> choice(std::string_view key, std::span<const std::string_view> choices);
     /// Three numbers in mm, as metres; each within `limit` mm of 0.

@@ -45,23 +45,6 @@ KeyValue valueOf(Section& section, std::string_view key, const toml::node& node)
     section.refuse(key, "a value must be a number, text, true or false");
 }
 
-std::vector<std::string> wordsOf(Section& section, std::string_view key)
-{
-    std::vector<std::string> out;
-    const toml::node* const node = section.node(key);
-    if (node == nullptr) {
-        return out;
-    }
-    const toml::array* const list = node->as_array();
-    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-        const auto word = list->get(i)->value_exact<std::string>();
-        section.refuseIf(!word || word->empty(), key, "expected a list of texts in quotes");
-        out.push_back(*word);
-    }
-    section.refuseIf(list == nullptr, key, "expected a list of texts in quotes");
-    return out;
-}
-
 void readRange(Section& section, std::string_view key, Axis& axis)
 {
     const toml::array* const list = section.node(key)->as_array();
@@ -160,7 +143,7 @@ void readSlurm(Section& top, SlurmSettings& slurm)
         slurm.time = section->word("time").value_or("");
         slurm.account = section->word("account").value_or("");
         slurm.memory = section->word("memory").value_or("");
-        slurm.options = wordsOf(*section, "options");
+        slurm.options = section->words("options");
         slurm.chunk = section->integer("chunk", "", 1, maxCases).value_or(0);
         section->finish();
     }
@@ -211,7 +194,7 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
             there.insert(o.name + "_change_pct");
         }
     }
-    auto words = wordsOf(top, "outputs");
+    auto words = top.words("outputs");
     if (words.empty()) {
         for (const OutputInfo& o : outputsOf(kind)) {
             words.push_back(o.name);
@@ -375,7 +358,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     }
     const ProcedureKind kind = kindOf(procedure, top);
     plan.settings.insert(plan.settings.begin(), procedure.begin(), procedure.end());
-    plan.constraints = wordsOf(top, "constraints");
+    plan.constraints = top.words("constraints");
     readOutputs(top, kind, plan);
     readMarks(top, plan);
     readSlurm(top, plan.slurm);

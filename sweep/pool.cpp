@@ -106,9 +106,6 @@ public:
     Processes(Shared& shared, std::size_t count, std::size_t jobs, const PoolWork& work)
         : shared_(shared), count_(count), work_(work), pids_(jobs, 0)
     {
-        for (std::size_t slot = 0; slot < jobs; ++slot) {
-            start(slot, idle);
-        }
     }
     ~Processes()
     {
@@ -121,6 +118,14 @@ public:
     }
     Processes(const Processes&) = delete;
     Processes& operator=(const Processes&) = delete;
+
+    // Not a part of the constructor: where the system gives no more processes, the destructor ends those that run.
+    void start()
+    {
+        for (std::size_t slot = 0; slot < pids_.size(); ++slot) {
+            start(slot, idle);
+        }
+    }
 
     void kill()
     {
@@ -198,6 +203,7 @@ PoolResult runPool(std::size_t count, int jobs, const PoolWork& work)
         std::min({count, static_cast<std::size_t>(std::max(jobs, 1)), static_cast<std::size_t>(maxJobs)});
     {
         Processes all(shared, count, processes, work);
+        all.start();
         auto told = begin;
         while (const std::size_t running = all.look(work.abandoned())) {
             if (work.abandoned()) {

@@ -82,25 +82,6 @@ std::string called(Section& section, std::string_view key, std::string_view what
     return *word;
 }
 
-std::vector<std::string> wordsOf(Section& section, std::string_view key)
-{
-    std::vector<std::string> words;
-    const toml::node* const node = section.node(key);
-    if (node == nullptr) {
-        return words;
-    }
-    if (!node->is_array()) {
-        section.refuse(key, "must be a list of texts");
-    }
-    for (const toml::node& one : *node->as_array()) {
-        if (!one.is_string() || one.as_string()->get().empty()) {
-            section.refuse(key, "must be a list of texts that are not empty");
-        }
-        words.push_back(one.as_string()->get());
-    }
-    return words;
-}
-
 Case loadCase(const fs::path& given)
 {
     Case made;
@@ -123,12 +104,12 @@ Case loadCase(const fs::path& given)
         top.missing("difficulty", "1 to 5");
     }
     made.difficulty = static_cast<int>(*difficulty);
-    made.briefing = wordsOf(top, "briefing");
+    made.briefing = top.words("briefing");
     if (made.briefing.empty()) {
         top.missing("briefing", "a list of the task's steps, a sentence each");
     }
-    made.trains = wordsOf(top, "trains");
-    made.measures = wordsOf(top, "measures");
+    made.trains = top.words("trains");
+    made.measures = top.words("measures");
     for (const std::string& measure : made.measures) {
         checkMeasure(top, "measures", measure);
     }

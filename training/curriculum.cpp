@@ -77,7 +77,7 @@ Exercise readExercise(Section& section, const Curriculum& before)
         section.refuse("case", fault.what());
     }
     if (section.has("after")) {
-        e.after = wordsOf(section, "after");
+        e.after = section.words("after");
     } else if (!before.exercises.empty()) {
         e.after = {before.exercises.back().id};
     }

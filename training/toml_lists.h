@@ -6,12 +6,8 @@
 
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace palpate::training {
-
-/// The texts of a list; none where the key is missing. Throws std::runtime_error for anything but a list of texts.
-std::vector<std::string> wordsOf(datasets::Section& section, std::string_view key);
 
 /// A text that must be there; `what` says what it is.
 std::string called(datasets::Section& section, std::string_view key, std::string_view what);
