@@ -227,6 +227,8 @@ void WindowStack::transfer(Field field) noexcept
             prolong(*kernels_, windows_[l + 1], windows_[l + 1].field(field), w, w.field(Field::t));
         }
         carryOver(w, oldLow_[l], oldCount_[l], w.field(field), w.field(Field::t));
+        // What is held here may have been free in the coarser window's cells.
+        kernels_->smoothFirst(1.0F, w.open.data(), w.field(Field::t), w.field(Field::t), w.layout.count);
         w.share(Field::t);
         w.fields[static_cast<std::size_t>(field)].swap(w.fields[static_cast<std::size_t>(Field::t)]);
     }

@@ -212,7 +212,8 @@ Vec3 continued(const Window& w, Field field, const float* holds, Index3 n) noexc
 }  // namespace
 
 // Nodes that hold no tissue in the fine window, but may in the coarse one, have no displacement of their own. Beside a gap
-// they keep what they have: a line would lead across it.
+// they keep what they have: a line would lead across it. What the coarse window solves itself, on the
+// fine one's border, and what it holds has nothing to take.
 void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept
 {
     const bool hasGaps = !fine.fragments.placed().empty() || !coarse.fragments.placed().empty();
@@ -221,9 +222,14 @@ void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcep
     volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
         const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
         const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
+        if (coarse.dof[target] > 0.0F) {
+            return;
+        }
+        const bool isHeld = coarse.open[target] == 0.0F;
         const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holds[source] > 0.0F;
         for (const Field field : fields) {
-            coarse.set(field, target, own ? fine.value(field, source) : continued(fine, field, holds, 2 * n));
+            coarse.set(field, target,
+                       isHeld ? Vec3(0.0) : own ? fine.value(field, source) : continued(fine, field, holds, 2 * n));
         }
     });
     Followers followers(fine, coarse);
