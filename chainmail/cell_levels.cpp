@@ -68,7 +68,7 @@ public:
         });
         coarse.cutRows = rowsOf(coarse.cuts, coarse.nodes.size, &CutCell::cell);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1, [&](Index3 n) {
-            coarse.fixed[coarse.nodes.offset(n)] = sharesAround(2 * n).isMostlyFixed() ? 1 : 0;
+            coarse.fixed[coarse.nodes.offset(n)] = isFixed(2 * n) ? 1 : 0;
         });
         fixFragments(coarse);
         return coarse;
@@ -88,8 +88,15 @@ private:
 
     static double weightOf(Index3 off) noexcept { return 1.0 / static_cast<double>(1 << (off.x + off.y + off.z)); }
 
-    // A coarse node stands for the fine ones around it. Those without tissue have no say: so the floor of a body that lies
-    // between two planes of coarse nodes is held by the plane outside.
+    // A coarse node is held where the fine one at its place is.
+    bool isFixed(Index3 place) const
+    {
+        const bool isThere = fine_.nodes.contains(place) && fine_.diagonal[fine_.nodes.offset(place)] > 0.0F;
+        return isThere ? fine_.fixed[fine_.nodes.offset(place)] != 0 : sharesAround(place).isMostlyFixed();
+    }
+
+    // One without tissue there stands for the fine ones around it. Those without tissue have no say: so the floor of a body
+    // that lies between two planes of coarse nodes is held by the plane outside.
     Shares sharesAround(Index3 middle) const
     {
         Shares shares;
@@ -251,6 +258,26 @@ void addDiagonal(CellLevel& level)
     }
 }
 
+// Virtual nodes are held where the node at their place is.
+void holdVirtual(CellLevel& level)
+{
+    for (VirtualNode& n : level.fragments.nodes) {
+        n.isFixed = level.fixed[level.nodes.offset(n.at)] != 0;
+    }
+}
+
+// Takes the stiffness from cells whose tissue is held: it is strained in none of them. A cell of bone that ends in front of a
+// node would hold that node, though the tissue beside the bone is free there.
+void yieldWhereHeld(const std::vector<float>& held, CellLevel& level)
+{
+    for (std::size_t i = 0; i < held.size(); ++i) {
+        if (held[i] >= whollyHeld) {
+            level.mu[i] = level.lambda[i] = 0.0F;
+        }
+    }
+    addDiagonal(level);
+}
+
 // A body that rests on a plane. What lies behind the plane is not strained, and is left out where cells are averaged.
 class Resting {
 public:
@@ -305,9 +332,7 @@ private:
             level.fixed[g.offset(n)] = on ? 1 : 0;
             nearest += on && height > -g.spacing ? 1 : 0;
         });
-        for (VirtualNode& n : level.fragments.nodes) {
-            n.isFixed = level.fixed[g.offset(n.at)] != 0;
-        }
+        holdVirtual(level);
         return nearest;
     }
 
@@ -367,9 +392,7 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 {
     const auto& g = level.nodes;
     level.fragments = std::move(split.coarse);
-    for (VirtualNode& n : level.fragments.nodes) {
-        n.isFixed = level.fixed[g.offset(n.at)] != 0;
-    }
+    holdVirtual(level);
     for (CellFragment& f : level.fragments.cells) {
         const std::size_t at = g.offset(f.cell);
         f.mu = std::exchange(level.mu[at], 0.0F);
@@ -401,6 +424,7 @@ void takeWhole(CellLevel whole, CellLevel& level)
     }
     whole.fragments = std::move(level.fragments);
     level = std::move(whole);
+    holdVirtual(level);
 }
 
 // The finest level keeps what is behind a support, for tools that come from there.
@@ -427,6 +451,7 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
 {
     FinestLevel first = support ? Resting::freePart(finest) : finest;
     std::vector<CellLevel> levels{withStiffSkin(first)};
+    levels.front().fixed = first.mostlyHeld;
     std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held, finest.octants);
     Split split;
     if (!finest.octants.empty()) {
@@ -439,8 +464,14 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
         std::vector<std::uint8_t> looser;
         levels.push_back(Coarsening(levels.back(), first.held, loose).level(coarser, looser));
         addDiagonal(levels.back());
+        if (levels.size() > 2) {
+            yieldWhereHeld(first.held, levels[levels.size() - 2]);
+        }
         first.held = std::move(coarser);
         loose = std::move(looser);
+    }
+    if (levels.size() > 1) {
+        yieldWhereHeld(first.held, levels.back());
     }
     CellLevel whole = first.level;
     addLayers(first, finest.held, surface, whole);

@@ -32,20 +32,22 @@ Index3 paddedNodes(Index3 cells, int& levels)
 }
 
 // Nodes around which half of the tissue is held: where the surface of bone runs through cells, those on its side of it.
-void fixMostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, CellLevel& level)
+std::vector<std::uint8_t> mostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
+                                     const volume::NodeGrid& nodes)
 {
+    std::vector<std::uint8_t> out(nodes.count(), 0);
     volume::forEachIndex(Index3(0), cells.size, [&](Index3 n) {
         float held = 0.0F;
         float filled = 0.0F;
         volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, cells.size - 1), [&](Index3 c) {
             const auto& m = materials[cells.offset(c)];
-            held += m.fixed;
-            filled += m.youngsModulus > minTissue ? 1.0F : 0.0F;
+            const float tissue = m.youngsModulus > minTissue ? m.fraction : 0.0F;
+            held += m.fixed * tissue;
+            filled += tissue;
         });
-        if (held > 0.0F && held >= 0.5F * whollyHeld * filled) {
-            level.fixed[level.nodes.offset(n)] = 1;
-        }
+        out[nodes.offset(n)] = held > 0.0F && held >= 0.5F * whollyHeld * filled ? 1 : 0;
     });
+    return out;
 }
 
 volume::Relaxation relaxationOf(const volume::CellMaterial& material, bool relaxes)
@@ -66,7 +68,8 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     level.mu.assign(level.nodes.count(), 0.0F);
     level.lambda.assign(level.nodes.count(), 0.0F);
     level.stiffening.assign(level.nodes.count(), 0.0F);
-    level.fixed.assign(level.nodes.count(), 0);
+    all.mostlyHeld = mostlyHeld(cells, materials, level.nodes);
+    level.fixed = all.mostlyHeld;
     all.held.assign(level.nodes.count(), 0.0F);
     for (auto& weights : level.relaxing) {
         weights.assign(relaxes ? level.nodes.count() : 0, 0.0F);
@@ -93,7 +96,6 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
         }
     });
-    fixMostlyHeld(cells, materials, level);
     return all;
 }
 

@@ -292,5 +292,29 @@ TEST(ElasticBody, CoarseCellsUnderAFreeSurfaceAreLaminates)
     }
 }
 
+// A bar stands on a plate of bone that is wider than it and ends within the cells of every level. Bone is 1e5 times as stiff: a
+// node in front of it, where the bar is free, that were a corner of a cell of bone would be held.
+TEST(ElasticBody, BoneHoldsNoNodeInFrontOfIt)
+{
+    const auto material = [](Index3 c) {
+        const bool isBar = c.y >= 3 && c.y < 13 && c.z >= 3 && c.z < 13;
+        return c.x < 9 ? tests::tissue(1e9, 0.3, true) : isBar ? tests::tissue(1e4, 0.49) : tests::tissue(0.0, 0.0);
+    };
+    const ElasticBody body = tests::bodyOf({{40, 16, 16}, 2e-3, material, 4, Vec3(0.0)});
+    ASSERT_GT(body.levels.size(), 2U);
+    for (std::size_t l = 1; l < body.levels.size(); ++l) {
+        const CellLevel& level = body.levels[l];
+        float most = 0.0F;
+        int freeNodes = 0;
+        for (std::size_t n = 0; n < level.diagonal.size(); ++n) {
+            const bool isFree = level.fixed[n] == 0 && level.diagonal[n] > 0.0F;
+            freeNodes += isFree ? 1 : 0;
+            most = std::max(most, isFree ? level.diagonal[n] : 0.0F);
+        }
+        EXPECT_GT(freeNodes, 0) << l;
+        EXPECT_LT(most, 2e3F * static_cast<float>(1U << l)) << l;  // a cell of bone adds 1e7 and more
+    }
+}
+
 }  // namespace
 }  // namespace palpate::chainmail
