@@ -1,4 +1,5 @@
 #include <base/error.h>
+#include <base/shell_word.h>
 #include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
 #include <haptics/recorder.h>
@@ -298,7 +299,9 @@ struct Recorder::Impl {
     bool stopping = false;
     std::optional<Results> results;
     std::string error;
+    std::string unfolded;  // why the log of a whole record is still there; empty: it is not, or a reader keeps it
     std::thread thread;
+    bool closed = false;  // of that thread: all that was written is sealed
 
     Impl(const std::string& path, const SessionInfo& info) : file(path), ring(ringCapacity(info.rate))
     {
@@ -337,9 +340,13 @@ struct Recorder::Impl {
             const bool failed = !error.empty();
             lock.unlock();
             std::string problem = failed ? drop() : store(toFinish, last);
+            std::string apart = toFinish && closed ? fold() : std::string();
             lock.lock();
             if (!problem.empty()) {
                 error = file + ": recording stopped: " + problem + "; what was written until then can be read";
+            }
+            if (toFinish) {
+                unfolded = std::move(apart);
             }
             answered = request;
             served.notify_all();
@@ -363,6 +370,7 @@ struct Recorder::Impl {
                 if (ring.read_available() == 0) {
                     break;
                 }
+                closed = false;
                 database->execute("BEGIN IMMEDIATE");
                 while (taken < ticksPerTransaction && ring.consume_one([&](const TickRecord& r) {
                     writer->write(r);
@@ -372,8 +380,9 @@ struct Recorder::Impl {
                 database->execute("COMMIT");
             } while (taken == ticksPerTransaction);
             taken = 0;
-            if (toFinish || last) {
+            if (toFinish || (last && !closed)) {
                 complete(toFinish.value_or(Results{}));
+                closed = true;
             }
             return {};
         } catch (const std::exception& e) {
@@ -395,6 +404,23 @@ struct Recorder::Impl {
         }
         writer->seal();
         database->execute("COMMIT");
+    }
+
+    // Folds the log into the file, so that one plain file is left. With a reader still there the log stays, which is as
+    // good: the reader leaves the file all that it needs. Returns what is to be done where there is no room for it.
+    std::string fold() noexcept
+    {
+        int status = sqlite3_wal_checkpoint_v2(database->get(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
+        if (status == SQLITE_OK) {
+            status = sqlite3_exec(database->get(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
+        }
+        const int kind = status & 0xFF;  // without what SQLite says in addition
+        if (kind == SQLITE_OK || kind == SQLITE_BUSY || kind == SQLITE_LOCKED) {
+            return {};
+        }
+        const std::string why = sqlite3_errmsg(database->get());
+        return file + ": is whole only together with " + file + "-wal: " + why + "; make room, then sqlite3 " +
+               base::shellWord(file) + " 'PRAGMA journal_mode = DELETE' makes one file of both";
     }
 
     // Writing to a file that has lost its name succeeds, and nobody finds it.
@@ -428,9 +454,7 @@ struct Recorder::Impl {
         const SignalsBlocked closing;
         writer.reset();
         if (error.empty()) {
-            // Folds the log into the file, so that one plain file is left. With a reader still there the log stays, which
-            // is as good.
-            sqlite3_exec(database->get(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
+            fold();  // what a reader kept until now
         }
         database.reset();
         const timespec now{};
@@ -479,7 +503,13 @@ std::uint64_t Recorder::lost() const noexcept
 std::string Recorder::error() const
 {
     const std::scoped_lock lock(impl_->mutex);
-    return impl_->error;
+    return impl_->error.empty() ? impl_->unfolded : impl_->error;
+}
+
+bool Recorder::whole() const
+{
+    const std::scoped_lock lock(impl_->mutex);
+    return impl_->error.empty() && lost() == 0;
 }
 
 }  // namespace palpate::haptics

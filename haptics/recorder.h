@@ -54,7 +54,7 @@ public:
     /// Throws std::runtime_error when the file cannot be made or exists already, and for a session that no record holds:
     /// a rate outside 100 Hz to 20 kHz, more structures or tissues than there may be, names of over 200 bytes.
     Recorder(const std::filesystem::path& file, const SessionInfo& info);
-    /// Writes what is left, marks the session complete and leaves one plain file.
+    /// Writes what is left, marks the session complete and leaves one plain file, as finish() does.
     ~Recorder();
 
     /// From one thread. Wait-free, allocates nothing; a full ring counts a lost record.
@@ -63,12 +63,15 @@ public:
     /// does not fill; never from a real-time loop.
     void flush();
     /// From the setting-up thread, after the servo loop has ended: writes what is left and key-value results, such as the
-    /// score, and marks the session complete.
+    /// score, marks the session complete and folds the log into the file, so that it is one plain file. Where a viewer
+    /// reads it then, the log stays until the viewer ends.
     void finish(const std::vector<std::pair<std::string, std::string>>& results);
     std::uint64_t lost() const noexcept;
-    /// Empty, or what went wrong in writing (a full disk, a file that was removed or moved; the latter after finish()): the
-    /// session goes on, and the user is told at its end.
+    /// Empty, or what went wrong in writing (a full disk, a file that was removed or moved, no room for one plain file; the
+    /// latter two after finish()): the session goes on, and the user is told at its end.
     std::string error() const;
+    /// Whether the record holds every tick; with its log beside it, where error() says that there was no room to fold it.
+    bool whole() const;
 
 private:
     struct Impl;

@@ -147,7 +147,7 @@ struct Trainer::Impl {
                               {"score_total", fmt::format("{:.1f}", result.score.total)}});
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();
-            result.recordCut = result.lostRecords > 0 || !result.problem.empty();
+            result.recordCut = !recorder->whole();
             if (result.lostRecords > 0 && result.problem.empty()) {
                 result.problem = fmt::format("{}: {} ticks were lost by the recorder: record to a faster disk",
                                              options.record.string(), result.lostRecords);
