@@ -2,8 +2,10 @@
 
 #include <base/error.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -80,12 +82,14 @@ PhantomLabels layeredPhantom(const PhantomValues& values)
     if (values.number("tumours") >= 1) {
         Random random(values.seed);
         Lump lump = makeLump(values.word("tumour_kind"), values.number("tumour_diameter_mm"), random);
-        double front = 0;
+        Vec3 low(0), high(0);
         for (const Vec3& p : surfacePoints(lump, 4000)) {
-            front = std::min(front, p.y);
+            low = glm::min(low, p);
+            high = glm::max(high, p);
         }
-        lump.centre = Vec3(0, values.number("tumour_depth_mm") - front, 0);
-        requireRoom(lump.centre.y + lump.bound < layers[3].depth && lump.bound < half, "layered", values);
+        lump.centre = Vec3(0, values.number("tumour_depth_mm") - low.y, 0);
+        const double across = std::max({-low.x, -low.z, high.x, high.z});
+        requireRoom(lump.centre.y + high.y < layers[3].depth && across < half, "layered", values);
         drawLump(out.image, lump, tumourLabel);
     }
     out.names = {{0, "air", "air"},

@@ -1,3 +1,4 @@
+#include <datasets/scene.h>
 #include <training/case.h>
 #include <training/curriculum.h>
 
@@ -33,6 +34,21 @@ TEST_P(EachCase, IsWithoutFault)
     useOwnData();
     for (const std::string& fault : faultsOf(findCase(GetParam()))) {
         ADD_FAILURE() << fault;
+    }
+}
+
+// The room for a tumour does not depend on the voxels, so the coarsest will do; but inserts need theirs.
+TEST_P(EachCase, HasAPhantomForEverySeed)
+{
+    useOwnData();
+    const std::string called = findCase(GetParam()).scene;
+    const auto builtIn = datasets::builtInScene(called);
+    datasets::Scene scene = builtIn ? *builtIn : datasets::loadScene(called);
+    ASSERT_TRUE(scene.source.file.empty()) << "no phantom: see what else its seed decides";
+    scene.source.phantom.voxel = scene.source.inserts.empty() ? 5e-3 : scene.source.phantom.voxel;
+    for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+        scene.source.phantom.seed = seed;
+        EXPECT_EQ(errorOf([&] { datasets::sceneVolume(scene); }), "") << "seed " << seed;
     }
 }
 
