@@ -5,7 +5,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <system_error>
 #include <utility>
 
 namespace palpate::command {
@@ -26,8 +30,12 @@ void addSetting(CLI::App& command, session::SceneChanges& changes)
 
 std::string seedFault(const std::string& text)
 {
-    const bool digits = !text.empty() && text.size() < 20 && text.find_first_not_of("0123456789") == std::string::npos;
-    return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
+    constexpr auto most = std::numeric_limits<std::int64_t>::max();  // that a scene can hold
+    const char* const end = text.data() + text.size();
+    std::int64_t value = -1;
+    const auto [stopped, failed] = std::from_chars(text.data(), end, value);
+    const bool whole = failed == std::errc() && stopped == end && text.front() != '-';
+    return whole ? "" : fmt::format("{}: must be a whole number from 0 to {}", text, most);
 }
 
 void refuseNoValues(CLI::App& app)

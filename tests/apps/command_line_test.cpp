@@ -66,8 +66,9 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     for (const std::string seconds : {"soon", "-1", "nan", "inf", "86401"}) {
         expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
     }
-    for (const std::string seed : {"-1", "1.5", "x", "99999999999999999999999"}) {
-        const std::string why = "--seed: " + seed + ": must be a whole number, 0 or more";
+    for (const std::string seed :
+         {"-1", "-0", "1.5", "x", "9223372036854775808", "18446744073709551615", "99999999999999999999999"}) {
+        const std::string why = "--seed: " + seed + ": must be a whole number from 0 to 9223372036854775807";
         expectRefusal({"train", "--seed", seed}, why);
         expectRefusal({"phantom", "breast", "--seed", seed, "-o", "never.vdb"}, why);
         expectRefusal({"scene", "v.vdb", "--lesion-in", "fat", "--seed", seed, "-o", "never.toml"}, why);
