@@ -27,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using training::CurriculumProgress;
 using training::ExerciseProgress;
+using training::PeopleGroup;
 using training::PersonProgress;
 
 struct ProgressArguments {
@@ -95,35 +96,46 @@ std::vector<std::string> namesIn(const std::string& text, const training::Profil
 
 // "experts=anna,bert": all sessions of these people that the filters let through, added to the group of this name.
 void addToGroup(const ProgressArguments& o, const std::string& text, const training::ProfileStore& store,
-                std::vector<report::ScoredGroup>& groups)
+                Curricula& curricula, std::vector<PeopleGroup>& groups)
 {
     const std::size_t equals = text.find('=');
     base::failIf(equals == 0 || equals == std::string::npos || equals + 1 == text.size(),
                  "--group {}: give a name and profiles, as in --group residents=anna,bert", text);
     const std::string called = text.substr(0, equals);
-    auto group = std::ranges::find(groups, called, &report::ScoredGroup::name);
+    auto group = std::ranges::find(groups, called, &PeopleGroup::name);
     group = group != groups.end() ? group : groups.insert(groups.end(), {called, {}});
+    const bool tables = !o.csv.empty() || !o.xapi.empty();  // which say whether levels were met
     for (const std::string& name : namesIn(text.substr(equals + 1), store)) {
-        for (const auto& s : store.sessions(store.find(name))) {
-            const bool wanted = (o.caseId.empty() || s.caseId == o.caseId) &&
-                                (o.exercise.empty() || s.curriculum + "/" + s.exercise == o.exercise);
-            if (wanted) {
-                group->sessions.push_back(training::rowOf(s));
-            }
-        }
+        const training::Person person = store.find(name);
+        PersonProgress p =
+            tables ? progressOf(store, person, {}, curricula) : PersonProgress{person, store.sessions(person), {}};
+        std::erase_if(p.sessions, [&](const training::StoredSession& s) {
+            return (!o.caseId.empty() && s.caseId != o.caseId) ||
+                   (!o.exercise.empty() && s.curriculum + "/" + s.exercise != o.exercise);
+        });
+        group->people.push_back(std::move(p));
     }
 }
 
-std::vector<report::ScoredGroup> groupsOf(const ProgressArguments& o, const training::ProfileStore& store)
+std::vector<PeopleGroup> groupsOf(const ProgressArguments& o, const training::ProfileStore& store, Curricula& curricula)
 {
-    std::vector<report::ScoredGroup> groups;
+    std::vector<PeopleGroup> groups;
     for (const std::string& text : o.groups) {
-        addToGroup(o, text, store, groups);
-    }
-    for (const report::ScoredGroup& g : groups) {
-        base::failIf(g.sessions.empty(), "--group {}: these people have no such sessions", g.name);
+        addToGroup(o, text, store, curricula, groups);
     }
     return groups;
+}
+
+report::ScoredGroup scored(const PeopleGroup& group)
+{
+    report::ScoredGroup out{group.name, {}};
+    for (const PersonProgress& p : group.people) {
+        for (const training::StoredSession& s : p.sessions) {
+            out.sessions.push_back(training::rowOf(s));
+        }
+    }
+    base::failIf(out.sessions.empty(), "--group {}: these people have no such sessions", group.name);
+    return out;
 }
 
 void printPerson(const PersonProgress& p)
@@ -163,6 +175,20 @@ void printSessionsOf(const PersonProgress& p)
     }
 }
 
+void print(const ProgressArguments& o, const std::vector<PersonProgress>& people,
+           const std::vector<report::ScoredGroup>& groups)
+{
+    for (const PersonProgress& p : people) {
+        printPerson(p);
+        if (!o.all) {
+            printSessionsOf(p);
+        }
+    }
+    if (!groups.empty()) {
+        fmt::print("{}\n", report::groupTable(groups));
+    }
+}
+
 void run(const ProgressArguments& o)
 {
     const training::ProfileStore store(o.profiles);
@@ -177,33 +203,26 @@ void run(const ProgressArguments& o)
             people.push_back(progressOf(store, person, asked, curricula));
         }
     }
-    const std::vector<report::ScoredGroup> groups = groupsOf(o, store);
+    const std::vector<PeopleGroup> grouped = groupsOf(o, store, curricula);
+    const auto groups = base::mapped<report::ScoredGroup>(grouped, scored);
     base::failIf(people.empty() && groups.empty(),
                  "progress: give a profile's name, --all, or --group NAME=PROFILE,PROFILE");
     if (!o.html.empty()) {
         training::writeProgressPage(o.html, people, groups);
     }
     if (!o.csv.empty()) {
-        training::writeProgressCsv(o.csv, people);
+        training::writeProgressCsv(o.csv, people, grouped);
     }
     if (!o.xapi.empty()) {
-        training::writeXapi(o.xapi, people);
+        training::writeXapi(o.xapi, people, grouped);
     }
     command::writeJson(o.json, progressFigures(people, groups));
     if (o.json != "-") {
-        for (const PersonProgress& p : people) {
-            printPerson(p);
-            if (!o.all) {
-                printSessionsOf(p);
-            }
-        }
-        if (!groups.empty()) {
-            fmt::print("{}\n", report::groupTable(groups));
-        }
-        for (const auto& [what, file] : {std::pair{"page", o.html}, {"table", o.csv}, {"statements", o.xapi}}) {
-            if (!file.empty() && file != "-") {
-                fmt::print("{}: {}\n", what, file.string());
-            }
+        print(o, people, groups);
+    }
+    for (const auto& [what, file] : {std::pair{"page", o.html}, {"table", o.csv}, {"statements", o.xapi}}) {
+        if (!file.empty() && file != "-" && o.json != "-") {
+            fmt::print("{}: {}\n", what, file.string());
         }
     }
 }
@@ -225,7 +244,7 @@ void addProgress(CLI::App& app)
     c->add_option("--case", o->caseId, "With --group: only sessions of this case");
     c->add_option("--exercise", o->exercise, "With --group: only sessions of this CURRICULUM/EXERCISE");
     c->add_option("--html", o->html, "Write a page (HTML) to this file");
-    c->add_option("--csv", o->csv, "Write a table (CSV) to this file, one row per session");
+    c->add_option("--csv", o->csv, "Write a table (CSV) to this file, one row per session; with --group also theirs");
     c->add_option("--xapi", o->xapi, "Write xAPI statements to this file");
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->add_option("--profiles", o->profiles, "File of profiles (default: ~/.local/share/palpate/profiles.db)");

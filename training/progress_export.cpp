@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
+#include <utility>
 
 namespace palpate::training {
 
@@ -96,8 +98,9 @@ json statement(const PersonProgress& p, const StoredSession& s)
 {
     const auto met = metOf(p, s);
     const char* const verb = !met ? "completed" : *met ? "passed" : "failed";
-    const std::string what = s.exercise.empty() ? "urn:palpate:case:" + urnPart(s.caseId.empty() ? s.scene : s.caseId)
-                                                : "urn:palpate:exercise:" + urnPart(s.curriculum) + ":" + urnPart(s.exercise);
+    const std::string what = s.exercise.empty()
+                                 ? "urn:palpate:case:" + urnPart(s.caseId.empty() ? s.scene : s.caseId)
+                                 : "urn:palpate:exercise:" + urnPart(s.curriculum) + ":" + urnPart(s.exercise);
     json context = {{"platform", s.build},
                     {"extensions",
                      {{"urn:palpate:case", s.caseId},
@@ -118,37 +121,61 @@ json statement(const PersonProgress& p, const StoredSession& s)
         {"timestamp", s.started}};
 }
 
-}  // namespace
-
-void writeProgressCsv(const std::filesystem::path& file, const std::vector<PersonProgress>& people)
+// A line for each session; `first` has the cells before the name.
+std::string linesOf(const std::vector<PersonProgress>& people, const std::string& first)
 {
-    std::string out = "name,session,started,curriculum,exercise,case,mode,guidance,met,rating,device,build,record";
-    for (const haptics::Measure& m : haptics::measures()) {
-        out += fmt::format(",{}", m.key);
-    }
+    std::string out;
     for (const PersonProgress& p : people) {
         for (const StoredSession& s : p.sessions) {
             const auto met = metOf(p, s);
-            out += fmt::format("\n{},{},{},{},{},{},{},{:g},{},{},{},{},{}", cell(p.person.name), s.id, cell(s.started),
-                               cell(s.curriculum), cell(s.exercise), cell(s.caseId), s.test ? "test" : "practice",
-                               s.guidance, met ? (*met ? "yes" : "no") : "", s.rating > 0 ? std::to_string(s.rating) : "",
-                               cell(s.device), cell(s.build), cell(s.record));
+            out += fmt::format("\n{}{},{},{},{},{},{},{},{:g},{},{},{},{},{}", first, cell(p.person.name), s.id,
+                               cell(s.started), cell(s.curriculum), cell(s.exercise), cell(s.caseId),
+                               s.test ? "test" : "practice", s.guidance, met ? (*met ? "yes" : "no") : "",
+                               s.rating > 0 ? std::to_string(s.rating) : "", cell(s.device), cell(s.build), cell(s.record));
             for (const haptics::Measure& m : haptics::measures()) {
                 const double value = valueIn(s.values, m.key);
                 out += std::isfinite(value) ? fmt::format(",{:.9g}", value) : ",";
             }
         }
     }
+    return out;
+}
+
+}  // namespace
+
+void writeProgressCsv(const std::filesystem::path& file, const std::vector<PersonProgress>& people,
+                      const std::vector<PeopleGroup>& groups)
+{
+    std::string out = groups.empty() ? "" : "group,";
+    out += "name,session,started,curriculum,exercise,case,mode,guidance,met,rating,device,build,record";
+    for (const haptics::Measure& m : haptics::measures()) {
+        out += fmt::format(",{}", m.key);
+    }
+    out += linesOf(people, groups.empty() ? "" : ",");
+    for (const PeopleGroup& g : groups) {
+        out += linesOf(g.people, cell(g.name) + ",");
+    }
     base::writeWhole(file, out + "\n");
 }
 
-void writeXapi(const std::filesystem::path& file, const std::vector<PersonProgress>& people)
+void writeXapi(const std::filesystem::path& file, const std::vector<PersonProgress>& people,
+               const std::vector<PeopleGroup>& groups)
 {
     json statements = json::array();
-    for (const PersonProgress& p : people) {
-        for (const StoredSession& s : p.sessions) {
-            statements.push_back(statement(p, s));
+    std::set<std::string> written;
+    const auto write = [&](const std::vector<PersonProgress>& some) {
+        for (const PersonProgress& p : some) {
+            for (const StoredSession& s : p.sessions) {
+                json one = statement(p, s);
+                if (written.insert(one["id"]).second) {
+                    statements.push_back(std::move(one));
+                }
+            }
         }
+    };
+    write(people);
+    for (const PeopleGroup& g : groups) {
+        write(g.people);
     }
     base::writeWhole(file, statements.dump(2, ' ', false, json::error_handler_t::replace) + "\n");
 }

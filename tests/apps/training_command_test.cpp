@@ -97,6 +97,13 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
     EXPECT_NE(two.out.find("a (n=1)"), std::string::npos) << two.out << two.err;
     const Outcome one = palpate({"progress", "--group", "a=Smith,Jane", "--group", "a=bert"});
     EXPECT_NE(one.out.find("a (n=2)"), std::string::npos) << one.out << one.err;
+    const std::string csv = folder_ / "g.csv", xapi = folder_ / "g.json";
+    const Outcome tables =
+        palpate({"progress", "--group", "a=Smith,Jane", "--group", "b=bert", "--csv", csv, "--xapi", xapi});
+    EXPECT_EQ(tables.status, 0) << tables.err;
+    EXPECT_NE(readText(csv).find("\na,\"Smith,Jane\",1,"), std::string::npos) << readText(csv);
+    EXPECT_NE(readText(csv).find("\nb,bert,2,"), std::string::npos) << readText(csv);
+    EXPECT_EQ(nlohmann::json::parse(readText(xapi)).size(), 2U);
     expectRefusal({"progress", "--group", "a=Smith,bert,nobody"}, "nobody: there is no such profile");
     for (const char* const option : {"--html", "--csv", "--xapi"}) {
         expectRefusal({"progress", "bert", option, "-"}, "this output goes to a file");

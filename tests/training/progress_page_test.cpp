@@ -9,6 +9,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -99,6 +100,27 @@ TEST(ProgressCsv, HasALineForEachSession)
     EXPECT_EQ(lines, somebody.people[0].sessions.size());
 }
 
+TEST(ProgressCsv, BeginsWithTheGroupWhereThereAreGroups)
+{
+    const tests::Folder folder;
+    const Somebody anna("anna"), bert("bert");
+    const std::vector<PeopleGroup> groups{{"a, b", anna.people}, {"c", bert.people}};
+    writeProgressCsv(folder / "g.csv", bert.people, groups);
+    std::istringstream in(textOf(folder / "g.csv"));
+    std::string line;
+    std::getline(in, line);
+    EXPECT_TRUE(line.starts_with("group,name,session,")) << line;
+    std::map<std::string, std::size_t> lines;
+    while (std::getline(in, line)) {
+        for (const char* const first : {",bert,", "\"a, b\",anna,", "c,bert,"}) {
+            lines[first] += line.starts_with(first) ? 1 : 0;
+        }
+    }
+    const std::size_t annas = anna.people[0].sessions.size(), berts = bert.people[0].sessions.size();
+    EXPECT_EQ(lines,
+              (std::map<std::string, std::size_t>{{",bert,", berts}, {"\"a, b\",anna,", annas}, {"c,bert,", berts}}));
+}
+
 // What the specification of xAPI asks of each statement: actor, verb and object with absolute IRIs, a UUID.
 TEST(Xapi, StatementsAreWholeAndTheSameAgain)
 {
@@ -109,7 +131,8 @@ TEST(Xapi, StatementsAreWholeAndTheSameAgain)
     EXPECT_EQ(textOf(folder / "a.json"), textOf(folder / "b.json"));
     const auto statements = nlohmann::json::parse(textOf(folder / "a.json"));
     ASSERT_EQ(statements.size(), somebody.people[0].sessions.size());
-    const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"), iri("[a-z]+:[A-Za-z0-9._~:/%-]+");
+    const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"),
+        iri("[a-z]+:[A-Za-z0-9._~:/%-]+");
     std::set<std::string> ids;
     for (std::size_t i = 0; i < statements.size(); ++i) {
         const auto& s = statements[i];
@@ -123,6 +146,16 @@ TEST(Xapi, StatementsAreWholeAndTheSameAgain)
         EXPECT_EQ(s["result"]["success"], met);
         EXPECT_TRUE(s["verb"]["id"].get<std::string>().ends_with(met ? "passed" : "failed"));
     }
+}
+
+TEST(Xapi, HasEachSessionOfGroupsOnce)
+{
+    const tests::Folder folder;
+    const Somebody anna("anna");
+    writeXapi(folder / "g.json", {}, {{"a", anna.people}});
+    writeXapi(folder / "both.json", anna.people, {{"a", anna.people}, {"b", anna.people}});
+    EXPECT_EQ(nlohmann::json::parse(textOf(folder / "g.json")).size(), anna.people[0].sessions.size());
+    EXPECT_EQ(textOf(folder / "g.json"), textOf(folder / "both.json"));
 }
 
 TEST(Xapi, NamesWithBlanksMakeNoWrongIri)
