@@ -51,23 +51,18 @@ void list(const ProfileArguments& o)
 {
     const ProfileStore store(o.profiles);
     const auto people = store.people();
-    if (!o.json.empty()) {
-        auto out = nlohmann::json::array();
-        for (const Person& p : people) {
-            out.push_back({{"name", p.name}, {"hand", nameOf(p.hand)}, {"created", p.created}, {"sessions", p.sessions}});
-        }
-        command::writeJson(o.json, {{"file", store.file().string()}, {"profiles", out}});
-    }
-    if (o.json == "-") {
-        return;
-    }
-    if (people.empty()) {
+    if (people.empty() && o.json != "-") {
         fmt::print("no profiles yet: palpate profile new NAME\n");
     }
+    auto figures = nlohmann::json::array();
     for (const Person& p : people) {
-        fmt::print("{:<24} {:<6} {:>14}, since {}\n", p.name, nameOf(p.hand),
-                   base::counted(static_cast<std::size_t>(p.sessions), "session"), p.created.substr(0, 10));
+        figures.push_back({{"name", p.name}, {"hand", nameOf(p.hand)}, {"created", p.created}, {"sessions", p.sessions}});
+        if (o.json != "-") {
+            fmt::print("{:<24} {:<6} {:>14}, since {}\n", p.name, nameOf(p.hand),
+                       base::counted(static_cast<std::size_t>(p.sessions), "session"), p.created.substr(0, 10));
+        }
     }
+    command::writeJson(o.json, {{"file", store.file().string()}, {"profiles", figures}});
 }
 
 void exportOne(const ProfileArguments& o)

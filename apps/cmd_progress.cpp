@@ -207,6 +207,10 @@ void run(const ProgressArguments& o)
     const auto groups = base::mapped<report::ScoredGroup>(grouped, scored);
     base::failIf(people.empty() && groups.empty(),
                  "progress: give a profile's name, --all, or --group NAME=PROFILE,PROFILE");
+    // First what a file that cannot be written takes from nobody.
+    if (o.json != "-") {
+        print(o, people, groups);
+    }
     if (!o.html.empty()) {
         training::writeProgressPage(o.html, people, groups);
     }
@@ -217,9 +221,6 @@ void run(const ProgressArguments& o)
         training::writeXapi(o.xapi, people, grouped);
     }
     command::writeJson(o.json, progressFigures(people, groups));
-    if (o.json != "-") {
-        print(o, people, groups);
-    }
     for (const auto& [what, file] : {std::pair{"page", o.html}, {"table", o.csv}, {"statements", o.xapi}}) {
         if (!file.empty() && file != "-" && o.json != "-") {
             fmt::print("{}: {}\n", what, file.string());

@@ -166,24 +166,23 @@ void scoreRecord(const ScoreArguments& options)
     const auto read = base::mapped<std::filesystem::path>(sessions, &Session::file);
     base::checkNames({options.report});
     base::checkOutputs({options.json, options.report}, read);
+    base::failIf(!options.report.empty() && groups.empty() && sessions.size() > 1,
+                 "{}: a report is of one record or of groups: give one file, or --group NAME=FILE,FILE",
+                 options.report.native());
     warn(sessions);
-    if (!options.report.empty()) {
-        if (!groups.empty()) {
-            report::writeGroupReport(options.report, groups);
-        } else if (sessions.size() == 1) {
-            report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
-        } else {
-            throw base::error("{}: a report is of one record or of groups: give one file, or --group NAME=FILE,FILE",
-                              options.report.native());
-        }
-    }
-    command::writeJson(options.json, figures(sessions, groups));
+    // First what a file that cannot be written takes from nobody.
     if (options.json != "-") {
         printSessions(sessions);
         if (!groups.empty()) {
             fmt::print("\n{}\n", report::groupTable(groups));
         }
     }
+    if (!options.report.empty() && !groups.empty()) {
+        report::writeGroupReport(options.report, groups);
+    } else if (!options.report.empty()) {
+        report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
+    }
+    command::writeJson(options.json, figures(sessions, groups));
 }
 
 }  // namespace

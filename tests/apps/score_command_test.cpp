@@ -2,6 +2,7 @@
 #include <apps/command.h>
 #include <haptics/score.h>
 
+#include <tests/error_of.h>
 #include <tests/haptics/synthetic_session.h>
 
 #include <gtest/gtest.h>
@@ -16,8 +17,8 @@ namespace {
 
 namespace synthetic = haptics::synthetic;
 
-// What `palpate score ARGUMENTS` prints.
-std::string score(std::vector<std::string> arguments)
+// What `palpate score ARGUMENTS` prints, also where it throws.
+void score(std::vector<std::string> arguments, std::string& printed)
 {
     CLI::App app;
     addScore(app);
@@ -27,10 +28,17 @@ std::string score(std::vector<std::string> arguments)
     try {
         app.parse(arguments);
     } catch (...) {
-        ::testing::internal::GetCapturedStdout();
+        printed = ::testing::internal::GetCapturedStdout();
         throw;
     }
-    return ::testing::internal::GetCapturedStdout();
+    printed = ::testing::internal::GetCapturedStdout();
+}
+
+std::string score(std::vector<std::string> arguments)
+{
+    std::string printed;
+    score(std::move(arguments), printed);
+    return printed;
 }
 
 nlohmann::json readJson(const std::filesystem::path& file)
@@ -52,6 +60,16 @@ std::string session(const synthetic::Folder& folder, const std::string& name, do
     }
     synthetic::record(folder / name, synthetic::info(), ticks);
     return (folder / name).string();
+}
+
+TEST(ScoreCommand, PrintsAlsoWhereItsFileCannotBeWritten)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.030, 2.5);
+    std::string printed;
+    const std::string error = tests::errorOf([&] { score({a, "--json", "/dev/full"}, printed); });
+    EXPECT_EQ(printed, score({a}));
+    EXPECT_NE(error.find("/dev/full: "), std::string::npos) << error;
 }
 
 TEST(ScoreCommand, GivesEachSessionsMeasuresInTheUnitsOfTheirNames)

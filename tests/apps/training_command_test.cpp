@@ -113,6 +113,20 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
                   "the exercise says how much guidance");
 }
 
+TEST_F(TrainingCommands, AFileThatCannotBeWrittenTakesNothingFromWhatIsPrinted)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"progress", "anna"}, {"progress", "--all"}, {"profile", "list"}}) {
+        std::vector<std::string> all = words;
+        all.insert(all.end(), {"--json", "/dev/full"});
+        const Outcome cut = palpate(all);
+        EXPECT_EQ(cut.status, 1);
+        EXPECT_EQ(cut.out, palpate(words).out) << words[0];
+        EXPECT_NE(cut.err.find("/dev/full: "), std::string::npos) << cut.err;
+    }
+}
+
 // What the note asks for: the numbers are the file's, so that of a person's first session need not be 1.
 TEST_F(TrainingCommands, ProgressListsTheSessionsThatANoteCanBeOf)
 {
