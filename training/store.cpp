@@ -6,11 +6,11 @@
 #include <base/nearest.h>
 #include <base/outputs.h>
 #include <base/utc.h>
-#include <base/utf8.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
 #include <training/belongings.h>
 #include <training/folders.h>
+#include <training/profile_name.h>
 
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -151,14 +151,6 @@ StoredSession readSession(const Statement& row)
     return s;
 }
 
-void checkLine(const std::string& what, const std::string& text, std::size_t most)
-{
-    const bool control =
-        std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-    base::failIf(text.empty() || text.size() > most || control || !base::isUtf8(text),
-                 "{}: must be 1 to {} bytes of text (UTF-8) in one line", what, most);
-}
-
 // Does the work, and says which file its errors are about.
 template <class Work>
 auto guarded(const fs::path& file, const Work& work)
@@ -195,9 +187,7 @@ fs::path ProfileStore::standardFile()
 
 Person ProfileStore::add(const std::string& name, Hand hand)
 {
-    checkLine("profile '" + name + "'", name, 100);
-    base::failIf(name.front() == ' ' || name.back() == ' ', "profile '{}': must not begin or end with a blank", name);
-    base::failIf(name.front() == '-', "profile '{}': must not begin with '-', which commands take for an option", name);
+    checkProfileName(name);
     for (const Person& one : people()) {
         base::failIf(one.name == name, "{}: there is a profile of this name already", name);
     }

@@ -11,6 +11,7 @@
 
 #include <fstream>
 #include <iterator>
+#include <map>
 
 namespace palpate::training {
 namespace {
@@ -101,6 +102,35 @@ TEST(ProfileStore, RefusesNamesThatAreNone)
     }
     EXPECT_NE(errorOf([&] { store.add("-x", Hand::right); }).find("begin with '-'"), std::string::npos);
     EXPECT_NE(errorOf([&] { store.find("ana"); }).find("did you mean anna?"), std::string::npos);
+}
+
+// U+200B, U+202E, a blank that does not break, U+0308 behind its letter: on a screen they are names that are there already.
+TEST(ProfileStore, RefusesNamesThatLookLikeAnother)
+{
+    const Folder folder;
+    ProfileStore store(folder / "p.db");
+    for (const auto& [name, said] : std::map<std::string, std::string>{
+             {"an\u200Bna", "character 3, U+200B, cannot be seen"},
+             {"\u202Eanna", "character 1, U+202E, cannot be seen"},
+             {"anna\U000E0041", "character 5, U+E0041, cannot be seen"},
+             {"anna\u00A0b", "character 5, U+00A0, is no plain blank"},
+             {"Mu\u0308ller", "character 3, U+0308, is an accent or a sign apart from its letter"},
+         }) {
+        const std::string error = errorOf([&] { store.add(name, Hand::right); });
+        EXPECT_NE(error.find(said), std::string::npos) << error;
+        EXPECT_EQ(error.find(name), std::string::npos) << "would turn the line round on a terminal";
+    }
+    for (const char* const name : {"M\u00FCller", "\u05D3\u05D5\u05D3", "\u0930\u093E\u092E", "\u738B\u82B3", "\uD55C"}) {
+        EXPECT_EQ(errorOf([&] { store.add(name, Hand::right); }), "") << name;
+    }
+}
+
+TEST(ProfileStore, FindsANameThatWouldBeRefusedNow)
+{
+    const Folder folder;
+    ProfileStore(folder / "p.db").add("anna", Hand::left);
+    Database((folder / "p.db").string(), SQLITE_OPEN_READWRITE).execute("UPDATE person SET name = 'Mu\u0308ller'");
+    EXPECT_EQ(ProfileStore(folder / "p.db").find("Mu\u0308ller").hand, Hand::left);
 }
 
 // The tables of version 1, as released programs would have left them.
