@@ -96,7 +96,7 @@ void checkCurriculum(const CurriculumArguments& o)
 
 void next(const CurriculumArguments& o)
 {
-    const training::ProfileStore store(o.profiles);
+    const auto store = training::ProfileStore::toRead(o.profiles);
     const training::Person person = store.find(o.profile);
     const auto sessions = store.sessions(person);
     // The one that was named, else that of the last session, else all.

@@ -49,7 +49,7 @@ void changeHand(const ProfileArguments& o)
 
 void list(const ProfileArguments& o)
 {
-    const ProfileStore store(o.profiles);
+    const auto store = ProfileStore::toRead(o.profiles);
     const auto people = store.people();
     if (people.empty() && o.json != "-") {
         fmt::print("no profiles yet: palpate profile new NAME\n");
@@ -67,7 +67,7 @@ void list(const ProfileArguments& o)
 
 void exportOne(const ProfileArguments& o)
 {
-    const ProfileStore store(o.profiles);
+    const auto store = ProfileStore::toRead(o.profiles);
     const fs::path to = o.output.empty() ? fs::path("-") : o.output;
     base::checkOutputs({to}, {store.file()});
     command::writeJson(to, store.exported(store.find(o.name)));
@@ -103,7 +103,7 @@ void erase(const ProfileArguments& o)
 
 void backup(const ProfileArguments& o)
 {
-    const ProfileStore store(o.profiles);
+    const auto store = ProfileStore::toRead(o.profiles);
     store.backup(o.output);
     fmt::print("{}: {} profiles\n", o.output.string(), store.people().size());
 }

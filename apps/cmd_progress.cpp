@@ -191,7 +191,7 @@ void print(const ProgressArguments& o, const std::vector<PersonProgress>& people
 
 void run(const ProgressArguments& o)
 {
-    const training::ProfileStore store(o.profiles);
+    const auto store = training::ProfileStore::toRead(o.profiles);
     base::checkNames({o.html, o.csv, o.xapi});
     base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;

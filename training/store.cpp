@@ -151,6 +151,36 @@ StoredSession readSession(const Statement& row)
     return s;
 }
 
+// All of a database, as it is at one moment.
+void copy(const Database& from, Database& to)
+{
+    sqlite3_backup* const job = sqlite3_backup_init(to.get(), "main", from.get(), "main");
+    base::failIf(job == nullptr, "{}", sqlite3_errmsg(to.get()));
+    const int done = sqlite3_backup_step(job, -1);
+    if (sqlite3_backup_finish(job); done != SQLITE_DONE) {
+        throw std::runtime_error(sqlite3_errstr(done));
+    }
+}
+
+bool canBeWritten(const fs::path& place)
+{
+    return ::faccessat(AT_FDCWD, place.c_str(), W_OK, AT_EACCESS) == 0;
+}
+
+// For SQLite: a file without a log is read as it is, since a log's index could not be made beside it.
+std::string readOnlyName(const fs::path& file)
+{
+    std::string name = "file:";
+    for (const char c : file.string()) {
+        name += std::string_view("%?#").find(c) != std::string_view::npos
+                    ? fmt::format("%{:02X}", static_cast<unsigned char>(c))
+                    : std::string(1, c);
+    }
+    std::error_code none;
+    const bool log = fs::exists(file.string() + "-wal", none);
+    return name + (log ? "" : "?immutable=1");
+}
+
 // Does the work, and says which file its errors are about.
 template <class Work>
 auto guarded(const fs::path& file, const Work& work)
@@ -164,17 +194,48 @@ auto guarded(const fs::path& file, const Work& work)
 
 }  // namespace
 
-ProfileStore::ProfileStore(const fs::path& file) : file_(file.empty() ? standardFile() : fs::absolute(file))
+ProfileStore::ProfileStore(const fs::path& file) : file_(placeOf(file))
 {
     makePrivate(file_);
     guarded(file_, [&] {
-        database_ = std::make_unique<Database>(file_.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
-        sqlite3_busy_timeout(database_->get(), busyTimeout);
-        // The content is not trusted to bring functions along; what is removed is overwritten.
-        database_->execute("PRAGMA trusted_schema = OFF; PRAGMA secure_delete = ON; PRAGMA foreign_keys = ON");
+        open(file_.string());
         migrate(*database_);
         database_->execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
     });
+}
+
+// What cannot be written is read into memory, where one of an older version can be brought up to date.
+ProfileStore ProfileStore::toRead(const fs::path& file)
+{
+    const fs::path place = placeOf(file);
+    const bool there = ::access(place.c_str(), F_OK) == 0 || errno != ENOENT;
+    if (there && canBeWritten(place) && canBeWritten(place.parent_path())) {
+        return ProfileStore(place);
+    }
+    ProfileStore store;
+    store.file_ = place;
+    guarded(place, [&] {
+        store.open(":memory:");
+        if (there) {
+            const Database kept(readOnlyName(place), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX);
+            copy(kept, *store.database_);
+        }
+        migrate(*store.database_);
+    });
+    return store;
+}
+
+fs::path ProfileStore::placeOf(const fs::path& file)
+{
+    return file.empty() ? standardFile() : fs::absolute(file);
+}
+
+void ProfileStore::open(const std::string& name)
+{
+    database_ = std::make_unique<Database>(name, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+    sqlite3_busy_timeout(database_->get(), busyTimeout);
+    // The content is not trusted to bring functions along; what is removed is overwritten.
+    database_->execute("PRAGMA trusted_schema = OFF; PRAGMA secure_delete = ON; PRAGMA foreign_keys = ON");
 }
 
 ProfileStore::~ProfileStore() = default;
@@ -372,14 +433,9 @@ void ProfileStore::backup(const fs::path& to) const
     const fs::path part = to.string() + fmt::format(".{}.part", ::getpid());
     try {
         makePrivate(part);
-        Database copy(part.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
-        sqlite3_backup* const job = sqlite3_backup_init(copy.get(), "main", database_->get(), "main");
-        base::failIf(job == nullptr, "{}", sqlite3_errmsg(copy.get()));
-        const int done = sqlite3_backup_step(job, -1);
-        if (sqlite3_backup_finish(job); done != SQLITE_DONE) {
-            throw std::runtime_error(sqlite3_errstr(done));
-        }
-        copy.execute("PRAGMA journal_mode = DELETE");
+        Database copied(part.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+        copy(*database_, copied);
+        copied.execute("PRAGMA journal_mode = DELETE");
         fs::rename(part, to);
     } catch (const std::exception& e) {
         std::error_code none;

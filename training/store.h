@@ -78,6 +78,9 @@ public:
     /// transaction; one of a newer version, or of another program, is refused.
     /// @param file  empty: the standard one
     explicit ProfileStore(const std::filesystem::path& file);
+    /// Opens the file for reading, and makes none: one that is not there has nobody. One that cannot be written, or whose
+    /// folder cannot, is read as it is at this moment.
+    static ProfileStore toRead(const std::filesystem::path& file);
     ~ProfileStore();
     ProfileStore(ProfileStore&&) noexcept;
 
@@ -115,6 +118,9 @@ public:
     void backup(const std::filesystem::path& to) const;
 
 private:
+    ProfileStore() = default;
+    static std::filesystem::path placeOf(const std::filesystem::path& file);
+    void open(const std::string& name);
     std::set<std::filesystem::path> recordsOf(const Person& person) const;
     void emptyLog();
 

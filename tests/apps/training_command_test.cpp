@@ -127,6 +127,16 @@ TEST_F(TrainingCommands, AFileThatCannotBeWrittenTakesNothingFromWhatIsPrinted)
     }
 }
 
+TEST_F(TrainingCommands, ReadingMakesNoProfiles)
+{
+    for (const std::vector<std::string>& words : {std::vector<std::string>{"progress", "--all"},
+                                                  {"profile", "list"},
+                                                  {"curriculum", "next", "--profile", "anna"}}) {
+        palpate(words);
+        EXPECT_FALSE(fs::exists(folder_ / "palpate")) << words[0];
+    }
+}
+
 // What the note asks for: the numbers are the file's, so that of a person's first session need not be 1.
 TEST_F(TrainingCommands, ProgressListsTheSessionsThatANoteCanBeOf)
 {

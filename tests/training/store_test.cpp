@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <iterator>
@@ -131,6 +132,52 @@ TEST(ProfileStore, FindsANameThatWouldBeRefusedNow)
     ProfileStore(folder / "p.db").add("anna", Hand::left);
     Database((folder / "p.db").string(), SQLITE_OPEN_READWRITE).execute("UPDATE person SET name = 'Mu\u0308ller'");
     EXPECT_EQ(ProfileStore(folder / "p.db").find("Mu\u0308ller").hand, Hand::left);
+}
+
+TEST(ProfileStore, ReadingMakesNothing)
+{
+    const Folder folder;
+    const auto store = ProfileStore::toRead(folder / "sub/profiles.db");
+    EXPECT_TRUE(store.people().empty());
+    EXPECT_EQ(store.file(), folder / "sub/profiles.db");
+    EXPECT_NE(errorOf([&] { store.find("anna"); }).find("no such profile"), std::string::npos);
+    EXPECT_FALSE(fs::exists(folder / "sub"));
+}
+
+/// While it lives, what is forbidden is forbidden to root too.
+class Nobody {
+public:
+    Nobody() { EXPECT_EQ(::geteuid() == 0 ? ::seteuid(65534) : 0, 0); }
+    ~Nobody() { EXPECT_EQ(::getuid() == 0 ? ::seteuid(0) : 0, 0); }
+    Nobody(const Nobody&) = delete;
+    Nobody& operator=(const Nobody&) = delete;
+};
+
+// Of version 1 too: it is brought up to date in memory.
+TEST(ProfileStore, ReadsWhatCannotBeWritten)
+{
+    const Folder folder;
+    const fs::path sub = folder / "100 % #1?", file = sub / "profiles.db";
+    {
+        ProfileStore store(file);
+        store.store(store.add("anna", Hand::right), sessionWith(40));
+    }
+    Database(file.string(), SQLITE_OPEN_READWRITE)
+        .execute("ALTER TABLE session DROP COLUMN note; ALTER TABLE session DROP COLUMN rating; PRAGMA user_version = 1");
+    const std::string before = bytesOf(file);
+    fs::permissions(folder.path(), fs::perms(0755));
+    fs::permissions(file, fs::perms(0444));
+    fs::permissions(sub, fs::perms(0555));
+    {
+        const Nobody nobody;
+        EXPECT_NE(errorOf([&] { ProfileStore{file}; }), "");
+        const auto store = ProfileStore::toRead(file);
+        ASSERT_EQ(store.people().size(), 1U);
+        EXPECT_EQ(store.sessions(store.find("anna")).at(0).values.at("total"), 40);
+    }
+    fs::permissions(sub, fs::perms(0755));
+    EXPECT_EQ(bytesOf(file), before);
+    EXPECT_EQ(std::distance(fs::directory_iterator(sub), fs::directory_iterator()), 1);
 }
 
 // The tables of version 1, as released programs would have left them.
