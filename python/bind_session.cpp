@@ -72,24 +72,14 @@ DeviceSample sampleOf(const double* pose, py::ssize_t numbers, Vec3 axis, std::u
     return sample;
 }
 
-TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, bool fresh)
-{
-    const auto numbers = Doubles::ensure(pose);
-    if (!numbers || numbers.ndim() != 1 || !isPoseOf(numbers.shape(0))) {
-        PyErr_Clear();
-        throw py::value_error(
-            "pose: give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the "
-            "probe's move");
-    }
-    const LiveSession::Use use(box.live);
-    const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
-    const py::gil_scoped_release others;
-    return {rowOf(box.live.step(sample))};
-}
-
 // Numbers as Python's caller gave them, none of which are words.
-Doubles doublesOf(const py::object& given, const char* name, const char* wanted)
+Doubles doublesOf(const py::handle& given, const char* name, const char* wanted)
 {
+    // numpy.ma alone adds this to an array. What it hides would be taken for numbers.
+    const bool masked = py::isinstance<py::array>(given) && py::hasattr(given, "mask");
+    if (masked) {
+        throw py::value_error(std::string(name) + ": is a masked array: give a plain one, such as its filled()");
+    }
     const auto array = py::array::ensure(given);
     const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
     auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
@@ -101,6 +91,22 @@ Doubles doublesOf(const py::object& given, const char* name, const char* wanted)
         throw py::value_error(std::string(name) + ": " + wanted);
     }
     return numbers;
+}
+
+TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, bool fresh)
+{
+    constexpr const char* shapes =
+        "give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the probe's move";
+    // Of a list numpy makes numbers at once, which is faster, and refuses what is none.
+    const auto numbers = py::isinstance<py::array>(pose) ? doublesOf(pose, "pose", shapes) : Doubles::ensure(pose);
+    if (!numbers || numbers.ndim() != 1 || !isPoseOf(numbers.shape(0))) {
+        PyErr_Clear();
+        throw py::value_error(std::string("pose: ") + shapes);
+    }
+    const LiveSession::Use use(box.live);
+    const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
+    const py::gil_scoped_release others;
+    return {rowOf(box.live.step(sample))};
 }
 
 // Whole numbers from 0 to `most`, one or `rows` of them.

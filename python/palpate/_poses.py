@@ -20,10 +20,13 @@ def press_path(start, direction, depth, *, speed=0.02, hold=0.1, lead=1e-3):
         n x 3 positions [m], float64.
     """
     start, direction = np.asarray(start, float), np.asarray(direction, float)
+    given = np.concatenate([start.ravel(), direction.ravel(), np.array([depth, speed, hold, lead], float)])
+    if not np.isfinite(given).all():
+        raise ValueError("press_path: start, direction, depth, speed, hold and lead have to be finite")
     length = np.linalg.norm(direction)
     if not 1e-100 < length < 1e100:  # squares of its components vanish or overflow
         largest = np.abs(direction).max()
-        direction = direction / largest if 0 < largest < np.inf else np.zeros(3)
+        direction = direction / largest if largest > 0 else np.zeros(3)
         length = np.linalg.norm(direction)
     if not length > 0:
         raise ValueError("direction: has no length")

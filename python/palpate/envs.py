@@ -9,6 +9,7 @@ Where gymnasium is installed, the classes are gymnasium.Env and the spaces are g
 
 import contextlib
 import multiprocessing
+import operator
 import os
 
 import numpy as np
@@ -185,10 +186,8 @@ class Biopsy(_Env):
         """One step of 20 ms. Returns (observation, reward, terminated, truncated, info)."""
         if self.session is None or self._done:
             raise Error("step: the episode is over: call reset()")
-        action = np.asarray(action, float)
-        if action.shape != (4,) or np.isnan(action).any():
-            raise ValueError("action: give 4 numbers: velocity along, to two sides, trigger")
-        action = np.clip(action, -1, 1)
+        action = _numbers(action, (4,), "action: give 4 numbers: velocity along, to two sides, trigger")
+        action = np.clip(action.astype(float), -1, 1)
         n = self.ticks_per_step
         way = action[:3] @ self._frame * (self.max_speed * _palpate.TICK_SECONDS)
         poses = np.empty((n, 6))
@@ -233,6 +232,26 @@ class Biopsy(_Env):
             [100 * tick["inserted"], 100 * self._distance, 100 * min(vital, 0.1), 100 * min(float(tick["ahead"]), 0.1)],
             phase, [force, float(tick["warning"]), 1.0 - self._steps / self.max_steps],
         ]).astype(np.float32)
+
+
+def _numbers(values, shape, wanted):
+    """An array of real numbers of this shape. Raises ValueError with what is wanted."""
+    array = np.asarray(values)
+    hidden = isinstance(values, np.ma.MaskedArray)
+    if hidden or array.shape != shape or array.dtype.kind not in "biuf" or np.isnan(array).any():
+        raise ValueError(wanted)
+    return array
+
+
+def _count(value, name):
+    """A whole number above 0. Raises TypeError or ValueError that names it."""
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: has to be a whole number, not {value!r}") from None
+    if isinstance(value, (bool, np.bool_)) or count < 1:
+        raise ValueError(f"{name}: has to be 1 or more, not {value!r}")
+    return count
 
 
 def _across(line):
@@ -289,18 +308,17 @@ class Vector:
     processes work, in one of them or here (Ctrl-C), closes all; reset() and step() then raise palpate.Error.
 
     Args:
-        count: how many environments.
+        count: how many environments, 1 or more.
         make: what makes one; called in the processes, so it has to be a function of a module. Default: Biopsy.
-        processes: default: all cores.
+        processes: 1 or more; default: all cores.
         seed: of all of them; default: another one each time.
         context: how processes start, see multiprocessing. With "spawn", the default, a script needs the usual
             `if __name__ == "__main__":`.
     """
 
     def __init__(self, count, make=Biopsy, *, processes=None, seed=None, context="spawn"):
-        if count < 1:
-            raise ValueError("count: has to be 1 or more")
-        processes = max(1, min(count, processes or os.cpu_count() or 1))
+        count = _count(count, "count")
+        processes = min(count, (os.cpu_count() or 1) if processes is None else _count(processes, "processes"))
         seed = np.random.SeedSequence(seed).entropy
         start = multiprocessing.get_context(context)
         self.count = count
@@ -333,10 +351,8 @@ class Vector:
         Returns:
             observations (count x 16), rewards, terminated, truncated (count each), infos (list of dict)
         """
-        actions = np.asarray(actions)
-        if actions.shape != self._action_shape or actions.dtype.kind not in "biuf" or np.isnan(actions).any():
-            shape = " x ".join(map(str, self._action_shape))
-            raise ValueError(f"actions: give {shape} numbers, a row for each environment")
+        shape = " x ".join(map(str, self._action_shape))
+        actions = _numbers(actions, self._action_shape, f"actions: give {shape} numbers, a row for each environment")
         results = self._ask([("step", actions[part]) for part in self._parts])
         observations, rewards, terminated, truncated, infos = zip(*results)
         return np.stack(observations), np.array(rewards), np.array(terminated), np.array(truncated), list(infos)

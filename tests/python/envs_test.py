@@ -122,8 +122,9 @@ class Biopsy(unittest.TestCase):
     def test_an_action_that_is_no_number_is_refused(self):
         env = make()
         env.reset(seed=1)
-        with self.assertRaisesRegex(ValueError, "give 4 numbers"):
-            env.step([np.nan, 0, 0, 0])
+        for wrong in ([np.nan, 0, 0, 0], np.zeros(4, complex), [1j, 0, 0, 0], np.ma.masked_equal([1, 0, 0, 0], 1), "abcd"):
+            with self.subTest(wrong), self.assertRaisesRegex(ValueError, "give 4 numbers"):
+                env.step(wrong)
         env.step(np.zeros(4))
 
     # What gymnasium.utils.env_checker.check_env asks of the random numbers, with an Env that keeps them as gymnasium's does.
@@ -295,6 +296,13 @@ class Vectors(unittest.TestCase):
             self.assertEqual(observations[:, 15].tolist(), [1, 1])
             self.assertEqual([i["final_observation"][15] for i in infos], [0, 0])
             self.assertFalse(np.array_equal(first, observations))
+
+    def test_counts_that_are_none_are_refused(self):
+        for name, arguments in {"count": lambda v: ((v, make), {}), "processes": lambda v: ((2, make), {"processes": v})}.items():
+            for value, error in (2.5, TypeError), ("2", TypeError), (True, ValueError), (0, ValueError), (-1, ValueError):
+                words, options = arguments(value)
+                with self.subTest(name, value=value), self.assertRaisesRegex(error, name):
+                    envs.Vector(*words, **options).close()
 
     def test_an_error_in_a_process_comes_here(self):
         with self.assertRaisesRegex(palpate.Error, "no needle"):

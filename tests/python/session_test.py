@@ -78,6 +78,15 @@ class Run(InFolder):
         for length in 1e200, 1e-200:
             np.testing.assert_array_equal(palpate.press_path([0, 0, 0], [0, length, 0], 1e-3), plain)
 
+    def test_a_path_of_what_is_no_number_is_refused(self):
+        for wrong in np.nan, np.inf, -np.inf:
+            for arguments in [((wrong, 0, 0), (0, 1, 0), 1e-3), ((0, 0, 0), (0, wrong, 0), 1e-3), ((0, 0, 0), (0, 1, 0), wrong)]:
+                with self.subTest(arguments=arguments), self.assertRaisesRegex(ValueError, "finite"):
+                    palpate.press_path(*arguments)
+            for name in "speed", "hold", "lead":
+                with self.subTest(name, wrong=wrong), self.assertRaisesRegex(ValueError, "finite"):
+                    palpate.press_path((0, 0, 0), (0, 1, 0), 1e-3, **{name: wrong})
+
     def test_bad_arguments_are_refused_and_change_nothing(self):
         session = palpate.Session(small_block())
         for wrong, call in [
@@ -89,6 +98,10 @@ class Run(InFolder):
             ("poses", lambda: session.run("abc")),
             ("poses", lambda: session.run([[0, 0, 0], [1, 2]])),
             ("poses", lambda: session.advance(np.zeros((4, 3), complex))),
+            ("poses: is a masked array", lambda: session.run(np.ma.zeros((4, 3)))),
+            ("buttons: is a masked array", lambda: session.run(np.zeros((4, 3)), buttons=np.ma.ones(4))),
+            ("pose: is a masked array", lambda: session.step(np.ma.masked_equal([0, 0, 1], 1))),
+            ("pose: give", lambda: session.step(np.zeros(3, complex))),
             *(("buttons", lambda b=b: session.run(np.zeros((4, 3)), buttons=b))
               for b in (2**40, -1, 1.7, np.nan, "1", None, [1, 1, 1, 2**32], 2**70)),
             *(("fresh", lambda f=f: session.run(np.zeros((4, 3)), fresh=f)) for f in ("False", np.nan, 2, None)),
