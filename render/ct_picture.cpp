@@ -4,8 +4,6 @@
 #include <render/overlay.h>
 #include <render/screen_image.h>
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -125,9 +123,11 @@ void CtPicture::paint()
 std::vector<std::string> CtPicture::caption(const Canvas& canvas, double wide, double font) const
 {
     const ct::Window& window = ct::windows[window_];
-    const std::string all = base::said(tr("CT scan {} at {:.1Lf} s; dose so far {:.1Lf} mGy cm; {} ({:.0f} to {:.0f} HU)"),
-                                       taken_, 1e-3 * static_cast<double>(tick_), taken_ * scenery_.ctDoseLength,
-                                       tr(windowNames[window_]), window.low, window.high);
+    const std::string scan = coming_.valid()
+                                 ? tr("CT scan is being computed")
+                                 : base::said(tr("CT scan {} at {:.1Lf} s"), taken_, 1e-3 * static_cast<double>(tick_));
+    const std::string all = base::said(tr("{}; dose so far {:.1Lf} mGy cm; {} ({:.0f} to {:.0f} HU)"), scan,
+                                       taken_ * scenery_.ctDoseLength, tr(windowNames[window_]), window.low, window.high);
     std::vector<std::string> lines;
     for (std::size_t from = 0, end = 0; end != std::string::npos; from = end + 2) {
         end = all.find("; ", from);
@@ -153,7 +153,7 @@ void CtPicture::drawLabels(Canvas& canvas, double font) const
 {
     for (std::size_t k = 0; k < scan_->hu.size(); ++k) {
         const Area t = tile(k);
-        label(canvas, {t.x + 0.4 * font, t.y + 0.4 * font}, fmt::format("z {:.1f} mm", 1e3 * scan_->height[k]), 0.8 * font);
+        label(canvas, {t.x + 0.4 * font, t.y + 0.4 * font}, base::said("z {:.1Lf} mm", 1e3 * scan_->height[k]), 0.8 * font);
     }
     const Area large = tile(scan_->hu.size() / 2);
     const double high = large.y + 0.5 * large.height;
@@ -166,9 +166,15 @@ void CtPicture::drawLabels(Canvas& canvas, double font) const
     canvas.text({large.x + 0.4 * font, large.y + 2.3 * font}, "5 cm", 0.8 * font, white, Align::left, true);
 }
 
-void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact)
+// Of a scan that has no picture yet.
+const char* CtPicture::whyEmpty(bool handIsHere) const
 {
-    take(exact);
+    return coming_.valid() ? tr("CT scan is being computed") : handIsHere ? tr("P takes a CT scan") : tr("no CT scan yet");
+}
+
+void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, const CtLook& look)
+{
+    take(look.exact);
     const double x = area.x + 0.5 * font, row = lineHeight * font;
     const std::vector<std::string> words = scan_ ? caption(canvas, area.width - font, font) : std::vector<std::string>();
     // The caption has the lower edge of the area to itself.
@@ -184,7 +190,7 @@ void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, doubl
     actor_->SetPosition(around.x, around.y);
     actor_->SetVisibility(1);
     if (!scan_) {
-        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, tr("P takes a CT scan"), font, grey,
+        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, whyEmpty(look.handIsHere), font, grey,
                     Align::centre);
         return;
     }

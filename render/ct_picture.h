@@ -22,6 +22,12 @@
 
 namespace palpate::render {
 
+/// How the last CT scan is drawn.
+struct CtLook {
+    bool exact = false;       // waits for a scan that has begun
+    bool handIsHere = false;  // this window takes scans
+};
+
 /// The last CT scan in the window: the slice through the needle's tip large, the others beside it, and the dose so far.
 class CtPicture {
 public:
@@ -34,8 +40,7 @@ public:
     /// Begins a scan when the hand has asked for one since the last look. `shape`: the last that came. In a record the scan
     /// is of the tick at which it was asked for.
     void see(const channel::State& state, const channel::Displaced& shape, const Recorded* recorded = nullptr);
-    /// `exact`: waits for a scan that has begun.
-    void draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact);
+    void draw(Canvas& canvas, const Area& area, const Area& around, double font, const CtLook& look);
     void hide();
     void nextWindow() noexcept;
 
@@ -44,6 +49,7 @@ private:
     void scan(const channel::State& state, std::span<const channel::Displacement> shape);
     Area tile(std::size_t slice) const;
     void paint();
+    const char* whyEmpty(bool handIsHere) const;
     std::vector<std::string> caption(const Canvas& canvas, double wide, double font) const;
     static void label(Canvas& canvas, Point2 at, const std::string& words, double size, Align align = Align::left);
     void drawLabels(Canvas& canvas, double font) const;

@@ -259,9 +259,9 @@ void Picture::render(Quality quality)
         session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
         drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
         const Area& around = layout_ == Layout::trainee ? plan.title : plan.ultrasound;
-        if (!plan.ultrasound.empty() && ctShown() && help_.empty())
-            ct_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still);
-        else if (!plan.ultrasound.empty() && !ctShown())
+        if (!plan.ultrasound.empty() && hasCt() && help_.empty())
+            ct_.draw(canvas_, plan.ultrasound, around, plan.font, {quality == Quality::still, coached_.handIsHere});
+        else if (!plan.ultrasound.empty() && !hasCt())
             ultrasound_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still, help_.empty());
         drawFlat(plan);
     }

@@ -1,3 +1,4 @@
+#include <base/words.h>
 #include <render/result_file.h>
 #include <tests/folder.h>
 #include <tests/render/studio.h>
@@ -139,6 +140,65 @@ TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
     picture.setSteps(false, false);
     picture.setDisplayScale(1);
     studio->resize(width, height);
+}
+
+// A body that is guided by CT, before the first scan.
+Picture& guidedByCt(Studio& studio)
+{
+    channel::Scenery scenery = studio.scenery;
+    scenery.ctSlices = 3;
+    scenery.ctWidth = 5e-3;
+    scenery.ctDoseIndex = 5;
+    scenery.ctDoseLength = 7.5;
+    studio.picture().open(scenery, studio.labels, "ct");
+    return studio.picture();
+}
+
+bool writes(const Picture& picture, const std::string& words)
+{
+    return std::ranges::any_of(picture.written(), [&](const Written& w) { return w.words.starts_with(words); });
+}
+
+// Who holds no tool is not told of a key that does nothing.
+TEST_F(WordsTest, BeforeTheFirstScanTheHandIsToldOfItsKeyAndNobodyElse)
+{
+    Picture& picture = guidedByCt(*studio);
+    const channel::State state = storyState(studio->scenery, 0.1);
+    for (const bool handIsHere : {true, false}) {
+        picture.setSteps(false, handIsHere);
+        picture.update(state, nullptr, {});
+        picture.render(Quality::still);
+        EXPECT_EQ(writes(picture, "P takes a CT scan"), handIsHere);
+        EXPECT_EQ(writes(picture, "no CT scan yet"), !handIsHere);
+    }
+    picture.setSteps(false, false);
+}
+
+// A scan takes a third of a second in a thread of its own: longer than one picture of the window.
+TEST_F(WordsTest, AScanThatIsBeingComputedSaysSo)
+{
+    Picture& picture = guidedByCt(*studio);
+    channel::State state = storyState(studio->scenery, 0.1);
+    for (state.pictures = 1; state.pictures < 3; ++state.pictures) {
+        picture.update(state, nullptr, {});
+        picture.render(Quality::moving);
+        EXPECT_TRUE(writes(picture, "CT scan is being computed")) << state.pictures;
+        picture.render(Quality::still);
+        EXPECT_TRUE(writes(picture, "CT scan " + std::to_string(state.pictures) + " at 0.1 s"));
+    }
+}
+
+TEST_F(WordsTest, SlicesOfAScanHaveTheDecimalSignOfTheLanguage)
+{
+    base::useLanguage("de");
+    Picture& picture = guidedByCt(*studio);
+    channel::State state = storyState(studio->scenery, 0.1);
+    state.pictures = 1;
+    picture.update(state, nullptr, {});
+    picture.render(Quality::still);
+    base::useLanguage("en");
+    EXPECT_TRUE(writes(picture, "z 5,0 mm"));
+    EXPECT_FALSE(writes(picture, "z 5.0 mm"));
 }
 
 // What was asked for is named, and not always a core.
