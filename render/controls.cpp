@@ -197,8 +197,7 @@ bool Controls::sceneHoldsProbe() const
 void Controls::storePicture()
 {
     picture_.ultrasound().store(images_);
-    if (!picture_.hasCt())  // where the same button takes a scan, with its dose
-        hand_.storePicture();
+    hand_.storePicture();
 }
 
 // By the keyboard: what the button of the index finger does while it is held.

@@ -58,9 +58,10 @@ public:
         int value = 0;  // of several that do the same to different things
         bool alt = false;
     };
-    // What else a key needs, added to its windows: a body with a CT or MR, the ultrasound picture or the CT scan that is
-    // shown, a needle as the tool, a probe that this window may move, one that no scene holds.
-    static constexpr unsigned ofImage = 16, ofUltrasound = 32, ofCt = 64, ofNeedle = 128, ofProbe = 256, ofFreeProbe = 512;
+    // What else a key needs, added to its windows: a body with a CT or MR, the ultrasound picture that is shown, a scene
+    // with CT or one without, a needle as the tool, a probe that this window may move, one that no scene holds.
+    static constexpr unsigned ofImage = 16, ofUltrasound = 32, ofCt = 64, ofNeedle = 128, ofProbe = 256, ofFreeProbe = 512,
+                              withoutCt = 1024;
     struct Key {
         unsigned windows;  // kinds, added up
         const char* shown;

@@ -172,7 +172,7 @@ const std::vector<Controls::Key> Controls::keys{
      marked("the tissue more opaque; with Shift less"),
      {{0, 'a'}},
      [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.shift ? 1 / opacityStep : opacityStep); }},
-    {every,
+    {every | withoutCt,
      "U",
      marked("ultrasound picture, body"),
      {{0, 'u'}},
@@ -255,7 +255,8 @@ bool Controls::applies(const Key& key) const
     const auto holds = [&](unsigned what, bool there) { return (key.windows & what) == 0 || there; };
     const bool needle = follower_.session() == nullptr || follower_.session()->scenery().tool == channel::ToolKind::needle;
     return (key.windows & here) != 0 && holds(ofImage, picture_.hasImage()) &&
-           holds(ofUltrasound, picture_.ultrasoundShown()) && holds(ofCt, picture_.ctShown()) && holds(ofNeedle, needle) &&
+           holds(ofUltrasound, picture_.ultrasoundShown()) && holds(ofCt, picture_.hasCt()) &&
+           holds(withoutCt, !picture_.hasCt()) && holds(ofNeedle, needle) &&
            holds(ofProbe, !sceneHoldsProbe() || hand_.commands()) && holds(ofFreeProbe, !sceneHoldsProbe());
 }
 
@@ -310,16 +311,18 @@ std::string keysInWords()
                                          {every, "In every window"}}) {
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
-            if ((k.windows & ~Controls::ofImage & ~Controls::ofNeedle) == windows)
+            if ((k.windows & ~Controls::ofImage & ~Controls::ofNeedle & ~Controls::withoutCt) == windows)
                 text += fmt::format("  {:<18}{}{}\n", k.shown, k.what,
-                                    (k.windows & Controls::ofImage) != 0 ? " (of a body with a CT or MR)" : "");
+                                    (k.windows & Controls::ofImage) != 0     ? " (of a body with a CT or MR)"
+                                    : (k.windows & Controls::withoutCt) != 0 ? " (not of a scene with CT)"
+                                                                             : "");
     }
     text += "\nWhile the ultrasound picture is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if ((k.windows & Controls::ofUltrasound) != 0)
             text += fmt::format("  {:<18}{}{}\n", k.shown, k.what,
                                 (k.windows & Controls::ofFreeProbe) != 0 ? " (where the scene has no probe)" : "");
-    text += "\nWhile the CT scan of a scene with CT is shown:\n";
+    text += "\nIn a scene with CT:\n";
     for (const Controls::Key& k : Controls::keys)
         if ((k.windows & Controls::ofCt) != 0)
             text += fmt::format("  {:<18}{}\n", k.shown, k.what);

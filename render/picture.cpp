@@ -226,11 +226,12 @@ void Picture::setNotice(const std::string& words, const std::string& smaller)
 ScreenPlan Picture::screenPlan() const
 {
     return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_,
-            ultrasoundShown_ || (ctShown() && layout_ != Layout::body)};
+            ultrasoundShown_ || (hasCt() && layout_ != Layout::body)};
 }
 
 void Picture::showUltrasound(bool shown)
 {
+    shown = shown && !hasCt();
     const bool turned = std::exchange(ultrasoundShown_, shown) != shown;
     if (!shown)
         ultrasound_.hide();

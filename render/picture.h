@@ -88,14 +88,13 @@ public:
     /// Shows the image through the session's next window.
     void nextWindow() noexcept;
     /// Shows the ultrasound picture in the place of the body, and the body in that of the slice; in layout instructor in
-    /// the place of the third slice. The scanner begins with the first time.
+    /// the place of the third slice. The scanner begins with the first time. Of a scene that is guided by CT there is none:
+    /// there a look costs a dose.
     void showUltrasound(bool shown);
     bool ultrasoundShown() const noexcept { return ultrasoundShown_; }
     UltrasoundPicture& ultrasound() noexcept { return ultrasound_; }
     const UltrasoundPicture& ultrasound() const noexcept { return ultrasound_; }
-    /// Whether the scene has CT, whose last scan is shown where the ultrasound picture is not.
-    bool ctShown() const noexcept { return ct_.opened() && !ultrasoundShown_; }
-    /// Whether the scene is guided by CT.
+    /// Whether the scene is guided by CT. The last scan is shown where others have the ultrasound picture.
     bool hasCt() const noexcept { return ct_.opened(); }
     void nextCtWindow() noexcept { ct_.nextWindow(); }
     /// Camera and opacities as they were when the session was opened.

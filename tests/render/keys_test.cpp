@@ -26,17 +26,27 @@ TEST(Keys, NoKeyHasTwoMeanings)
         for (const Controls::Stroke& s : key.strokes) {
             EXPECT_NE(s.key == 0, s.name == 0) << key.shown;
             EXPECT_TRUE(s.key == 0 || s.key >= GLFW_KEY_ESCAPE || s.key == GLFW_KEY_SPACE) << key.shown;
-            // What is shown: the body, the ultrasound picture, the CT scan.
+            // What is shown: the body, the ultrasound picture, CT in the place of both.
             for (const unsigned window : {1U, 2U, 4U, 8U})
                 for (const int shown : {0, 1, 2})
                     if ((key.windows & window) != 0 && ((key.windows & Controls::ofUltrasound) == 0 || shown == 1) &&
-                        ((key.windows & Controls::ofCt) == 0 || shown == 2)) {
+                        ((key.windows & Controls::ofCt) == 0 || shown == 2) &&
+                        ((key.windows & Controls::withoutCt) == 0 || shown != 2)) {
                         EXPECT_TRUE(seen.emplace(window, shown, s.key, s.name, s.alt).second)
                             << key.shown << ": " << key.what;
                     }
         }
     }
     EXPECT_GT(seen.size(), 40U);
+}
+
+// There a look costs a dose.
+TEST(Keys, NoneShowsAnUltrasoundPictureWhereTheSceneHasCt)
+{
+    for (const Controls::Key& key : Controls::keys) {
+        const bool shows = std::string(key.what).find("ultrasound picture") != std::string::npos;
+        EXPECT_EQ(shows, (key.windows & Controls::withoutCt) != 0) << key.shown << ": " << key.what;
+    }
 }
 
 // The page has what `palpate-view --keys` prints, and so each key of the list.

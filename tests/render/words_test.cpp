@@ -201,6 +201,20 @@ TEST_F(WordsTest, SlicesOfAScanHaveTheDecimalSignOfTheLanguage)
     EXPECT_FALSE(writes(picture, "z 5.0 mm"));
 }
 
+// There a look costs a dose.
+TEST_F(WordsTest, ABodyThatIsGuidedByCtHasNoUltrasoundPicture)
+{
+    Picture& picture = guidedByCt(*studio);
+    picture.showUltrasound(true);
+    EXPECT_FALSE(picture.ultrasoundShown());
+    picture.open(studio->scenery, studio->labels, "other");
+    picture.showUltrasound(true);
+    EXPECT_TRUE(picture.ultrasoundShown());
+    guidedByCt(*studio);
+    EXPECT_FALSE(picture.ultrasoundShown()) << "shown before";
+    picture.showUltrasound(false);
+}
+
 // What was asked for is named, and not always a core.
 TEST(ResultFile, NamesWhatWasJudged)
 {
