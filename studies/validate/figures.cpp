@@ -37,8 +37,10 @@ std::string percent(const Experiment& e, double value)
 std::string tableHtml(const std::vector<Experiment>& experiments)
 {
     std::string out =
-        "<table><tr><th>experiment</th><th>what is compared</th><th>measured</th><th>fitted on</th><th>predicted</th>"
-        "<th>error %</th><th>worst %</th><th>scatter %</th><th>bound %</th><th>verdict</th><th></th></tr>\n";
+        "<section class=\"card\"><h2>All experiments</h2><div class=\"scroll\"><table "
+        "class=\"plain\"><tr><th>experiment</th>"
+        "<th>what is compared</th><th>measured</th><th>fitted on</th><th>predicted</th><th>error %</th><th>worst %</th>"
+        "<th>scatter %</th><th>bound %</th><th>verdict</th><th></th></tr>\n";
     for (const Experiment& e : experiments) {
         out += "<tr>";
         for (const std::string& cell :
@@ -48,7 +50,7 @@ std::string tableHtml(const std::vector<Experiment>& experiments)
         }
         out += "</tr>\n";
     }
-    return out + "</table>\n";
+    return out + "</table></div></section>\n";
 }
 
 report::Chart chartOf(const Experiment& e)

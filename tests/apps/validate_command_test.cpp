@@ -84,6 +84,10 @@ TEST(ValidateCommand, FolderHasAPageAndPictures)
                              "relaxation-hysteresis.png"}) {
         EXPECT_TRUE(std::filesystem::exists((folder / "v") / name)) << name << o.err;
     }
+    // Its eleven columns are wider than a narrow window.
+    const std::string page = readText(folder / "v/validation.html");
+    EXPECT_NE(page.find("<div class=\"scroll\"><table class=\"plain\">"), std::string::npos);
+    EXPECT_EQ(page.find("<table>"), std::string::npos);
 }
 
 }  // namespace
