@@ -67,7 +67,7 @@ Result result()
 Comparison comparison(std::mt19937& random)
 {
     constexpr std::size_t sessions = 60;
-    Comparison c{{"group 1", "group 2"}, {sessions, sessions}, {}};
+    Comparison c{{"group 1", "group 2"}, {sessions, sessions}, {}, {}};
     for (int i = 0; i < 12; ++i) {
         ComparedMeasure m{fmt::format("Measure {}", i + 1), "mm", 1, {}, 0.3};
         for (int group = 0; group < 2; ++group) {

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace palpate::trainer {
@@ -71,19 +73,27 @@ Spread spreadOf(const json& group, const std::string& key)
     return s;
 }
 
-// Whether there is anything to see: two values that differ.
-bool differs(const ComparedMeasure& m)
+// The values of all sessions, as the page prints them. A session without one adds none.
+std::vector<double> valuesOf(const ComparedMeasure& m)
 {
-    std::optional<double> first;
+    const double unit = std::pow(10.0, std::max(m.decimals, 1));
+    std::vector<double> all;
     for (const Spread& s : m.groups) {
-        for (const double v : s.values) {
-            if (first && *first != v) {
-                return true;
-            }
-            first = v;
-        }
+        std::ranges::transform(s.values, std::back_inserter(all), [unit](double v) { return std::round(v * unit) / unit; });
     }
-    return false;
+    return all;
+}
+
+// Its one value in words, where no session differs from another: also not in having no value. Else nothing.
+std::optional<std::string> sameInAll(const ComparedMeasure& m, int sessions)
+{
+    const std::vector<double> all = valuesOf(m);
+    const bool none = all.empty();
+    if (!none && (std::ssize(all) != sessions || std::ranges::any_of(all, [&](double v) { return v != all[0]; }))) {
+        return {};
+    }
+    const std::string label = m.unit.empty() ? m.label : m.label + " [" + m.unit + "]";
+    return none ? said(tr("{} without a value"), label) : said("{} {:.{}Lf}", label, all[0], m.decimals);
 }
 
 // Medians of counts lie between them: half a pass is not none.
@@ -129,7 +139,9 @@ Comparison comparisonIn(const json& figures)
         if (const auto effects = figures.find("effect_size"); effects != figures.end()) {
             m.effect = numberAt(*effects, key.c_str());
         }
-        if (differs(m)) {
+        if (auto same = sameInAll(m, std::accumulate(out.sessions.begin(), out.sessions.end(), 0))) {
+            out.same.push_back(std::move(*same));
+        } else {
             out.measures.push_back(std::move(m));
         }
     });

@@ -42,7 +42,8 @@ struct ComparedMeasure {
 struct Comparison {
     std::vector<std::string> names;
     std::vector<int> sessions;              // of each group
-    std::vector<ComparedMeasure> measures;  // those that differ
+    std::vector<ComparedMeasure> measures;  // those that differ, as printed
+    std::vector<std::string> same;          // the others in words, with their one value: "Passes 1"
 };
 
 /// The groups in what `palpate progress --group .. --json` gives.

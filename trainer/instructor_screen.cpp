@@ -3,6 +3,8 @@
 
 #include <base/said.h>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
@@ -180,12 +182,15 @@ void drawMembers(State& state)
     for (std::size_t n = 0; n < state.people.size(); ++n) {
         ImGui::PushID(static_cast<int>(n));
         rollsAsOne() ? words(state.people[n].name) : void();
-        ImGui::RadioButton(tr("in none"), &i.groupOf[n], 0);
-        for (int group = 1; group <= 2; ++group) {
-            const std::string label = said(tr("group {}"), group);
-            besideIfRoom(label + "    ");
-            ImGui::PushStyleColor(ImGuiCol_CheckMark, vec(groupColour(static_cast<std::size_t>(group - 1))));
-            ImGui::RadioButton(label.c_str(), &i.groupOf[n], group);
+        for (int group = 0; group <= 2; ++group) {
+            const std::string label = group == 0 ? tr("in none") : said(tr("group {}"), group);
+            group == 0 ? void() : besideIfRoom(label + "    ");
+            const Rgb mark = groupColour(static_cast<std::size_t>(std::max(group, 1) - 1));
+            ImGui::PushStyleColor(ImGuiCol_CheckMark,
+                                  group == 0 ? ImGui::GetStyle().Colors[ImGuiCol_CheckMark] : vec(mark));
+            if (ImGui::RadioButton(label.c_str(), i.groupOf[n] == group)) {
+                putIntoGroup(state, n, group);
+            }
             ImGui::PopStyleColor();
         }
         if (!rollsAsOne()) {
@@ -206,7 +211,7 @@ Errand drawChoiceOfGroups(State& state)
         at == state.cases.end() ? 0 : static_cast<std::size_t>(at - state.cases.begin()) + 1;  // 0: all cases
     const auto title = [&](std::size_t n) { return n == 0 ? tr("of all cases") : state.cases[n - 1].title; };
     if (const auto now = choice(label, title(chosen), state.cases.size() + 1, chosen, title)) {
-        i.caseId = *now == 0 ? "" : state.cases[*now - 1].id;
+        compareCase(state, *now == 0 ? "" : state.cases[*now - 1].id);
     }
     const bool compare = buttonBeside(tr("Compare"));
     i.asPage = buttonBeside(tr("Compare, as a page too"));
@@ -219,7 +224,7 @@ std::string spreadInWords(const Spread& s, int decimals)
     return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
 }
 
-void drawComparison(const Comparison& c)
+void drawDifferences(const Comparison& c)
 {
     const float em = ImGui::GetFontSize();
     // In a narrow window the table rolls by itself.
@@ -254,6 +259,16 @@ void drawComparison(const Comparison& c)
         tr("Medians with quartiles; dots are sessions. Cliff's delta: how much more often a value of the first group lies "
            "above one of the second than below it, -1 to 1."),
         quiet);
+}
+
+void drawComparison(const Comparison& c)
+{
+    if (!c.measures.empty()) {
+        drawDifferences(c);
+    }
+    if (!c.same.empty()) {
+        words(said(tr("The same in all sessions: {}."), fmt::format("{}", fmt::join(c.same, ", "))));
+    }
 }
 
 Errand drawGroups(State& state)

@@ -9,6 +9,7 @@
 #include <array>
 #include <cassert>
 #include <tuple>
+#include <utility>
 
 namespace palpate::trainer {
 
@@ -270,6 +271,22 @@ void noteTyped(State& state)
 bool hasDraft(const Instructor& instructor, const KeptSession& session)
 {
     return instructor.drafts.contains({session.name, session.number});
+}
+
+void putIntoGroup(State& state, std::size_t person, int group)
+{
+    Instructor& i = state.instructor;
+    i.groupOf.resize(state.people.size(), 0);
+    if (std::exchange(i.groupOf.at(person), group) != group) {
+        i.comparison = {};
+    }
+}
+
+void compareCase(State& state, const std::string& caseId)
+{
+    if (std::exchange(state.instructor.caseId, caseId) != caseId) {
+        state.instructor.comparison = {};
+    }
 }
 
 void sessionStarted(State& state, SessionFiles files, std::string command)

@@ -165,6 +165,10 @@ void chooseKept(State& state, std::size_t session);
 void noteTyped(State& state);
 /// Whether something that was typed for this session is not kept yet.
 bool hasDraft(const Instructor& instructor, const KeptSession& session);
+/// Instructor's screen: a person goes into a group (1 or 2), or into none (0). A comparison of other groups goes.
+void putIntoGroup(State& state, std::size_t person, int group);
+/// Instructor's screen: only sessions of this case are compared; empty: all. A comparison of others goes.
+void compareCase(State& state, const std::string& caseId);
 /// What `palpate progress` has learnt of the person.
 void progressLoaded(State& state, Progress progress);
 /// Null where nobody is chosen.

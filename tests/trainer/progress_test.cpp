@@ -112,10 +112,31 @@ TEST(Instructor, MeasuresThatDoNotDifferAreNotCompared)
       "effect_size": {"total": -0.5, "passes": 0}})"));
     ASSERT_EQ(c.measures.size(), 1U);
     EXPECT_EQ(c.measures[0].label, "Total");
+    EXPECT_EQ(c.same, std::vector<std::string>{"Passes 1"});
     EXPECT_EQ(c.measures[0].effect, -0.5);
     EXPECT_TRUE(std::isinf(c.measures[0].groups[0].upper)) << "more than a quarter have no value";
     EXPECT_EQ(c.measures[0].groups[0].values.size(), 1U);
     EXPECT_EQ(c.sessions[0], 2);
+}
+
+// As the page has it: what is printed alike is the same, and so is having no value; a value that some lack is not.
+TEST(Instructor, MeasuresThatAreTheSameInAllSessionsAreNamed)
+{
+    const auto compared = [](const std::string& first, const std::string& second) {
+        const std::string group =
+            R"({"name": "a", "n": 1, "median": {}, "lower_quartile": {}, "upper_quartile": {}, "values": )";
+        return comparisonIn(
+            json::parse(R"({"measures": [{"key": "m", "label": "Largest force", "unit": "N", "decimals": 2}],
+            "groups": [)" +
+                        group + R"({"m": [)" + first + "]}}, " + group + R"({"m": [)" + second + "]}}]}"));
+    };
+    const Comparison same = compared("1.2301", "1.2299"), without = compared("null", "null"),
+                     some = compared("1.23", "null");
+    EXPECT_EQ(same.same, std::vector<std::string>{"Largest force [N] 1.23"});
+    EXPECT_TRUE(same.measures.empty());
+    EXPECT_EQ(without.same, std::vector<std::string>{"Largest force [N] without a value"});
+    EXPECT_TRUE(some.same.empty());
+    EXPECT_EQ(some.measures.size(), 1U);
 }
 
 }  // namespace

@@ -92,6 +92,28 @@ TEST(State, ANoteThatIsNotKeptYetIsThereWhenItsSessionIsChosenAgain)
     EXPECT_FALSE(hasDraft(i, i.everybody.sessions[1]));
 }
 
+// A table stands under the choice that it is of.
+TEST(State, AComparisonGoesWhenOtherGroupsOrCasesAreChosen)
+{
+    State state = firstState();
+    state.people = {{"Ada", false}, {"Bo", false}};
+    const Comparison some{{"group 1", "group 2"}, {1, 1}, {}, {}};
+    Instructor& i = state.instructor;
+    putIntoGroup(state, 0, 1);
+    i.comparison = some;
+    putIntoGroup(state, 0, 1);
+    EXPECT_EQ(i.comparison.names.size(), 2U) << "nothing has changed";
+    putIntoGroup(state, 1, 1);
+    EXPECT_TRUE(i.comparison.names.empty());
+    EXPECT_EQ(i.groupOf, (std::vector<int>{1, 1}));
+    i.comparison = some;
+    compareCase(state, "");
+    EXPECT_EQ(i.comparison.names.size(), 2U);
+    compareCase(state, "second");
+    EXPECT_TRUE(i.comparison.names.empty());
+    EXPECT_EQ(i.caseId, "second");
+}
+
 TEST(State, WhatIsSaidOnAScreenIsNotSaidOnTheNext)
 {
     State state = firstState();
