@@ -195,7 +195,7 @@ void drawMembers(State& state)
         }
         if (!rollsAsOne()) {
             ImGui::SameLine();
-            ImGui::TextUnformatted(state.people[n].name.c_str());
+            ImGui::TextUnformatted(drawable(state.people[n].name).c_str());
         }
         ImGui::PopID();
     }

@@ -1,10 +1,17 @@
 #pragma once
 
+#include <string>
+
 namespace palpate::trainer {
 
 /// Colours, spacing and font of the window. Call once for each text scale, between pictures.
 /// @param scale  of texts and spaces; 1: 18 pixels a line
 void setLook(float scale);
+
+/// The text as ImGui can draw it, from left to right: Hebrew and Arabic turned round, and what the font does not have as
+/// code points, "[U+5F20 U+4F1F]". Two people never look the same.
+/// @pre  the font's atlas is built
+std::string drawable(const std::string& text);
 
 /// Colours with a meaning (Okabe and Ito 2008: told apart with any kind of colour blindness).
 struct Rgb {

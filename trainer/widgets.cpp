@@ -17,7 +17,7 @@ using base::tr;
 void words(const std::string& text)
 {
     ImGui::PushTextWrapPos(0);
-    ImGui::TextUnformatted(text.c_str());
+    ImGui::TextUnformatted(drawable(text).c_str());
     ImGui::PopTextWrapPos();
 }
 
@@ -117,7 +117,8 @@ std::string fitted(const std::string& label)
 
 std::string preview(const std::string& chosen)
 {
-    return shortened(chosen, ImGui::CalcItemWidth() - ImGui::GetFrameHeight() - 2 * ImGui::GetStyle().FramePadding.x);
+    return shortened(drawable(chosen),
+                     ImGui::CalcItemWidth() - ImGui::GetFrameHeight() - 2 * ImGui::GetStyle().FramePadding.x);
 }
 
 std::optional<std::size_t> choice(const std::string& name, const std::string& shown, std::size_t count, std::size_t chosen,
@@ -129,7 +130,7 @@ std::optional<std::size_t> choice(const std::string& name, const std::string& sh
     }
     for (std::size_t i = 0; i < count; ++i) {
         ImGui::PushID(static_cast<int>(i));
-        now = ImGui::Selectable(label(i).c_str(), i == chosen) ? i : now;
+        now = ImGui::Selectable(drawable(label(i)).c_str(), i == chosen) ? i : now;
         ImGui::PopID();
     }
     ImGui::EndCombo();
@@ -142,8 +143,8 @@ void drawRow(ImVec2 at, const std::string& title, const std::string& facts, Rgb 
     ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
     ImGui::BeginGroup();
     const float wide = ImGui::GetContentRegionAvail().x;
-    ImGui::TextUnformatted(shortened(title, wide).c_str());
-    ImGui::TextColored(vec(colour), "%s", shortened(facts, wide).c_str());
+    ImGui::TextUnformatted(shortened(drawable(title), wide).c_str());
+    ImGui::TextColored(vec(colour), "%s", shortened(drawable(facts), wide).c_str());
     ImGui::EndGroup();
     ImGui::SetCursorPos(next);
 }

@@ -10,7 +10,6 @@
 #include <imgui_internal.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 #include <tuple>
@@ -110,18 +109,41 @@ TEST(Look, WordsOnBarsCanBeRead)
     ImGui::DestroyContext();
 }
 
-TEST(Look, NamesHaveTheirLetters)
+struct Names : testing::Test {
+    Names()
+    {
+        ImGui::CreateContext();
+        setLook(1);
+        unsigned char* pixels = nullptr;
+        int wide = 0, high = 0;
+        ImGui::GetIO().Fonts->GetTexDataAsRGBA32(&pixels, &wide, &high);
+    }
+    ~Names() override { ImGui::DestroyContext(); }
+
+    // Else ImGui's own font, which ends with Latin 1.
+    static bool hasDejaVu() { return ImGui::GetIO().Fonts->Fonts[0]->FindGlyphNoFallback(0x141) != nullptr; }
+};
+
+TEST_F(Names, HaveTheirLetters)
 {
-    ImGui::CreateContext();
-    setLook(1);
-    unsigned char* pixels = nullptr;
-    int wide = 0, high = 0;
-    ImGui::GetIO().Fonts->GetTexDataAsRGBA32(&pixels, &wide, &high);
-    const ImFont& font = *ImGui::GetIO().Fonts->Fonts[0];
-    const bool own = font.FindGlyphNoFallback(0xE4) == nullptr;  // ImGui's, where DejaVu is not installed
-    constexpr std::array<ImWchar, 5> letters{0x141, 0x159, 0x3A9, 0x416, 0x1EC7};
-    EXPECT_TRUE(own || std::ranges::all_of(letters, [&](ImWchar c) { return font.FindGlyphNoFallback(c) != nullptr; }));
-    ImGui::DestroyContext();
+    for (const char* name : {"Łukasz Dvořák", "Αθηνά", "Жанна", "Nguyệt", "Անի", "ნინო", "ᐊᓂ"})
+        EXPECT_TRUE(!hasDejaVu() || drawable(name) == name) << drawable(name);
+}
+
+// ImGui draws from left to right.
+TEST_F(Names, InHebrewAndArabicAreTurnedRound)
+{
+    EXPECT_TRUE(!hasDejaVu() || drawable("Dr. דוד כהן (2)") == "Dr. ןהכ דוד (2)") << drawable("Dr. דוד כהן (2)");
+    EXPECT_TRUE(!hasDejaVu() || drawable("سعد") == "دعس");
+}
+
+// What the font does not have looks alike: 張偉, 李娜 and a character beyond 16 bits were "??".
+TEST_F(Names, WithoutLettersInTheFontAreToldApart)
+{
+    EXPECT_EQ(drawable("Wei 张伟: 1"), "Wei [U+5F20 U+4F1F]: 1");
+    EXPECT_NE(drawable("李娜"), drawable("张伟"));
+    EXPECT_EQ(drawable("𠮷"), "[U+20BB7]");
+    EXPECT_EQ(drawable("a\xE9"), "a[U+00E9]") << "not UTF-8, as a path may be";
 }
 
 // Nothing lies over the window's side; what is too long has a bar to roll it by.
