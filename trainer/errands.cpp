@@ -96,6 +96,12 @@ struct Errands::Impl {
         const std::string said = command.message();
         return said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
     }
+    // What a command that needs profiles has said, or why there can be none.
+    static std::string aboutProfiles(const std::string& said)
+    {
+        const std::string why = said.empty() ? "" : whyNoProfiles();
+        return why.empty() ? said : why;
+    }
     // What a short command writes as JSON; null where it fails, and the state says why.
     nlohmann::json answerOf(State& state, std::vector<std::string> arguments)
     {
@@ -112,6 +118,7 @@ struct Errands::Impl {
     {
         const auto answer = answerOf(state, {"profile", "list"});
         if (answer.is_discarded()) {
+            state.notice = aboutProfiles(state.notice);
             return;  // who was there stays
         }
         state.people = peopleOf(answer);
@@ -249,7 +256,7 @@ struct Errands::Impl {
         const std::string name = state.newPerson;
         Running command(programs / "palpate", {"profile", "new", "--", name}, scratch / "person.log");
         command.finish(answerTime);
-        state.notice = command.message();
+        state.notice = aboutProfiles(command.message());
         listPeople(state);
         if (std::ranges::find(state.people, name, &PersonEntry::name) != state.people.end()) {
             state.person = name;
@@ -413,6 +420,8 @@ void Errands::list(State& state)
         each(impl_->answerOf(state, {"curriculum", "list"}), "curricula",
              [this](const auto& one) { impl_->curricula.push_back(one.at("id").template get<std::string>()); });
         impl_->choosePerson(state);
+        const std::string why = whyNoSessions(impl_->sink.folder());
+        state.notice += (state.notice.empty() || why.empty() ? "" : "\n") + why;
     } catch (const std::exception& e) {
         state.notice = e.what();
     }

@@ -1,6 +1,6 @@
 #include <trainer/results.h>
 
-#include <base/error.h>
+#include <base/outputs.h>
 #include <base/said.h>
 #include <base/user_files.h>
 #include <trainer/lists.h>
@@ -13,6 +13,7 @@
 #include <array>
 #include <ctime>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <tuple>
@@ -26,6 +27,16 @@ using base::said;
 using base::tr;
 
 namespace {
+
+bool canBeWritten(const fs::path& folder)
+{
+    try {
+        base::checkOutputFolder(folder);
+        return true;
+    } catch (const std::runtime_error&) {
+        return false;
+    }
+}
 
 // What a level asks for, and whether it was met; empty: there is none.
 std::string levelInWords(const nlohmann::json& asked)
@@ -205,9 +216,10 @@ SessionFolder::SessionFolder(fs::path folder) : folder_(std::move(folder)) {}
 
 SessionFiles SessionFolder::filesFor(const CaseEntry& of)
 {
-    std::error_code failed;
-    fs::create_directories(folder_, failed);
-    base::failIf(static_cast<bool>(failed), "{}: cannot be made ({})", folder_.native(), failed.message());
+    if (const std::string why = whyNoSessions(folder_); !why.empty()) {
+        throw std::runtime_error(why);
+    }
+    base::makeFolders(folder_);
     const std::string stem = fmt::format("{}-{:%Y%m%d-%H%M%S}", of.id, fmt::localtime(std::time(nullptr)));
     for (int i = 0;; ++i) {
         const fs::path base = folder_ / (i == 0 ? stem : fmt::format("{}-{}", stem, i));
@@ -235,6 +247,20 @@ std::optional<double> SessionFolder::best(const CaseEntry& of) const
         }
     }
     return best;
+}
+
+std::string whyNoSessions(const fs::path& folder)
+{
+    return canBeWritten(folder)
+               ? ""
+               : said(tr("{}: no session can be kept there. Start palpate-trainer with --sessions and another folder."),
+                      folder.string());
+}
+
+std::string whyNoProfiles()
+{
+    const fs::path folder = base::userFolder(base::UserFolder::data);
+    return canBeWritten(folder) ? "" : said(tr("{}: no profiles can be kept there, and so no progress."), folder.string());
 }
 
 fs::path sessionsFolder()

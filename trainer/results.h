@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 namespace palpate::trainer {
 
@@ -43,6 +44,11 @@ public:
 private:
     std::filesystem::path folder_;
 };
+
+/// Why sessions cannot be kept in a folder, and what to do, in words; empty: they can.
+std::string whyNoSessions(const std::filesystem::path& folder);
+/// The same of profiles, which are in base::UserFolder::data.
+std::string whyNoProfiles();
 
 /// `sessions` of base::UserFolder::data; without a home, of a folder for temporary files.
 std::filesystem::path sessionsFolder();

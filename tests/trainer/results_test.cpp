@@ -1,3 +1,5 @@
+#include <base/words.h>
+#include <tests/error_of.h>
 #include <tests/folder.h>
 #include <trainer/results.h>
 
@@ -139,6 +141,24 @@ TEST(Results, TheBestOfACaseIsThatOfItsOwnFiles)
           "{\"score\": {\"total\": 99, \"points\": {\"core\": 1, \"vital\": 1, \"technique\": 1}}}");
     EXPECT_EQ(sink.best(layered), 71.5);
     EXPECT_EQ(sink.best(other), 99);
+}
+
+// A file is in the way: that stops root as well.
+TEST(Results, AFolderThatCannotBeMadeIsSaidWithTheOptionForAnother)
+{
+    const Folder folder;
+    write(folder / "file", "");
+    SessionFolder sink(folder / "file/sessions");
+    const std::string english = tests::errorOf([&] { sink.filesFor({}); });
+    base::useLanguage("de");
+    const std::string german = tests::errorOf([&] { sink.filesFor({}); });
+    base::useLanguage("en");
+    for (const std::string& said : {english, german}) {
+        EXPECT_NE(said.find((folder / "file/sessions").string()), std::string::npos) << said;
+        EXPECT_NE(said.find("--sessions"), std::string::npos) << said;
+    }
+    EXPECT_NE(english, german);
+    EXPECT_EQ(whyNoSessions(folder / "new/sessions"), "");
 }
 
 TEST(Devices, AreToldWithWhatToDo)
