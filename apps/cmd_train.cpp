@@ -283,6 +283,7 @@ ViewersWanted viewersFor(const TrainArguments& o, const Training& training, cons
 {
     ViewersWanted wanted;
     wanted.session = sessionName(o);
+    wanted.title = training.title();
     wanted.layout = o.layout;
     wanted.pictures = drawsLater(o) ? "" : o.pictures;
     wanted.images = !o.ownRecord || recordFile(o).empty() ? fs::path() : recordFile(o).replace_extension(".ultrasound");

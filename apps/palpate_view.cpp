@@ -114,6 +114,7 @@ void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Word
     palpate::command::addChoice(app, "--slices", words.slices,
                                 "Slices of a body with an image: tissue, tinted (image in the tissues' colours) or image",
                                 {"tissue", "tinted", "image"});
+    app.add_option("--title", options.title, "Heading of the picture (default: the scene's name)");
     app.add_flag("--ultrasound", options.ultrasound, "Start with the ultrasound picture (key U)");
     app.add_option("--images", options.images, "Folder for stored ultrasound pictures (key P)")->capture_default_str();
     app.add_option("--hide", options.concealed.tissues,
@@ -155,6 +156,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
 {
     readSize(words.size, options);
     applyLook(words, options);
+    options.title = palpate::base::tr(options.title);
     palpate::base::checkOutputs({words.json, words.timeline, options.movie}, {words.replay, words.ghost, options.result});
     std::optional<palpate::apps::ReplayPlayer> player;
     if (!words.replay.empty()) {

@@ -41,6 +41,8 @@ public:
 
     /// The scene to open; empty: none of the options says one.
     std::string scene() const { return case_ ? case_->scene : ""; }
+    /// Of the case; empty: there is none.
+    std::string title() const { return case_ ? case_->title : ""; }
     /// Guidance of this trial.
     void change(session::SceneChanges& changes) const;
     /// Where the record goes when nobody asked for one; empty: nowhere.

@@ -86,6 +86,9 @@ void Viewers::openWindow()
 void Viewers::start(std::optional<base::ChildProcess>& viewer, std::vector<std::string> arguments) const
 {
     arguments.insert(arguments.end(), {"--session", wanted_.session, "--wait", "30"});
+    if (!wanted_.title.empty()) {
+        arguments.push_back("--title=" + wanted_.title);
+    }
     viewer.emplace(base::programFolder() / "palpate-view", arguments,
                    "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
 }

@@ -15,6 +15,7 @@ namespace palpate::apps {
 /// Which viewers a session starts.
 struct ViewersWanted {
     std::string session;               // its name
+    std::string title;                 // of the case; empty: none
     std::string layout;                // of the window
     std::string pictures;              // folder of pictures to write; empty: none
     std::filesystem::path images;      // folder of the ultrasound pictures that its user stores; empty: the current one

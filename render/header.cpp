@@ -51,12 +51,12 @@ struct Column {
     }
 };
 
-void drawTitle(Column& column, const channel::Scenery& scenery, const channel::State& state, const std::string& session)
+void drawTitle(Column& column, const channel::State& state, const Header& header)
 {
     const double size = 1.25 * column.font;
-    const std::string title = shortened(column.canvas, text(scenery.scene), size, true, column.width),
+    const std::string title = shortened(column.canvas, header.title, size, true, column.width),
                       time = said("{:.1Lf} s", state.time);
-    const std::string all = said(tr("session {}   {}"), session, time);
+    const std::string all = said(tr("session {}   {}"), header.session, time);
     const double room = column.width - column.canvas.widthOf(title, size, true) - 2 * column.font;
     column.line(title, size, white, true);
     for (const std::string& words : {all, time})
@@ -198,7 +198,7 @@ HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::S
     Column title = columnOf(plan.title);
     const bool apart = !plan.events.empty();  // the title has a place of its own, which the keys need
     if (!header.keysListed || !apart)
-        drawTitle(title, scenery, state, header.session);
+        drawTitle(title, state, header);
     Column column = apart ? columnOf({plan.banner.x, 0, plan.banner.width, plan.height}) : title;
     std::vector<Part> parts = partsOf(plan, scenery, state, header);
     const double bar = header.timeline < 0 ? 0 : font;

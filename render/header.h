@@ -21,7 +21,7 @@ struct ResultCard {
 /// What stands above the body: title, time, caption with the bar of a record, step, what is wrong, warning. One below the
 /// other, each broken into as many lines as it takes: nothing lies on anything else.
 struct Header {
-    std::string session, caption;
+    std::string title, session, caption;
     double timeline = -1;  // how much of a record is over, in [0, 1]; negative: no record
     Coaching coaching;
     bool keysListed = false;  // below it

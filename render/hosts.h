@@ -10,6 +10,7 @@ namespace palpate::render {
 /// What a picture shows, and how, of what was asked for.
 inline void setUp(Picture& picture, const ViewerOptions& options)
 {
+    picture.setTitle(options.title);
     picture.setPalette(options.palette);
     picture.setGhost(options.ghost);
     picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);

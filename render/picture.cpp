@@ -401,7 +401,7 @@ void Picture::drawFlat(const ScreenPlan& plan)
 Header Picture::header() const
 {
     const Session& s = *session_;
-    Header header{s.name, caption_, timeline_, {}};
+    Header header{title_.empty() ? text(s.scenery.scene) : title_, s.name, caption_, timeline_, {}};
     if (!stepsTold_ || !words_.empty())
         return header;
     if (told_) {

@@ -56,6 +56,8 @@ public:
     void update(const channel::State& state, const channel::Displaced* displaced, const Health& health);
     /// Takes a state down for traces and events, also between pictures.
     void note(const channel::State& state);
+    /// The heading; empty: the scene's name.
+    void setTitle(const std::string& title) { title_ = title; }
     /// Words across the picture until the next setNotice(); empty = none.
     void setNotice(const std::string& words, const std::string& smaller);
     /// What a session came to, instead of the notice, until the next open().
@@ -141,7 +143,7 @@ private:
     Canvas canvas_;
     std::unique_ptr<Session> session_;
     std::future<void> painting_;  // of the slices, while the body is drawn
-    std::string words_, smaller_, caption_;
+    std::string title_, words_, smaller_, caption_;
     Palette palette_ = Palette::standard;
     Ghost ghost_;
     const Recorded* recorded_ = nullptr;

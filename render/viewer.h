@@ -49,6 +49,7 @@ inline constexpr int leastSide = 320;  // of windows and pictures [pixels]
 /// What a viewer shows, and where.
 struct ViewerOptions {
     std::string session;                   // name; empty = the only one that runs
+    std::string title;                     // heading of the picture; empty = the scene's name
     std::filesystem::path offscreen;       // folder for PNG files
     std::filesystem::path movie;           // MP4 file; neither = a window
     Ghost ghost;                           // of an expert, shown beside a record; empty: none

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Texts of cases and curricula as gettext's entries: case_texts.py FILE.toml.. ; the names of tissues as people say them; names of measures."""
+"""Texts of cases and curricula as gettext's entries: case_texts.py FILE.toml.. ; the names of tissues and structures as people say them; names
+of measures."""
 
 import pathlib
 import re
@@ -20,6 +21,16 @@ def spoken_names():
     return [known.get(name, name.replace("_", " ")) for name in names]
 
 
+def structure_names():
+    """Targets and vital structures of the included scenes, as base/spoken.h says them."""
+    root = pathlib.Path(__file__).parent.parent
+    scenes = [tomllib.loads(file.read_text())
+              for file in sorted([*root.glob("datasets/scenes/*.toml"), *root.glob("training/cases/*/scene.toml")])]
+    names = [name for scene in scenes
+             for name in (scene["target"]["structure"], *(vital["name"] for vital in scene.get("vital", [])))]
+    return [name.replace("_", " ") for name in names]
+
+
 def measures():
     """Labels and units of haptics::measures()."""
     root = pathlib.Path(__file__).parent.parent
@@ -28,7 +39,7 @@ def measures():
 
 
 def main():
-    texts = spoken_names() + measures()
+    texts = spoken_names() + structure_names() + measures()
     for file in sys.argv[1:]:
         made = tomllib.loads(pathlib.Path(file).read_text())
         texts += [made["title"], *made.get("trains", []), *made.get("briefing", [])]

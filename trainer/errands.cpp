@@ -198,8 +198,9 @@ struct Errands::Impl {
     void seeKept(State& state) { watch(state, "--replay"); }
     void watch(State& state, const char* what)
     {
-        const std::vector<std::string> words{what,        state.instructor.watched, "--layout", "instructor",
-                                             "--palette", state.settings.palette};
+        const std::vector<std::string> words{
+            what,        state.instructor.watched, titleOption(state.instructor.watchedTitle), "--layout", "instructor",
+            "--palette", state.settings.palette};
         eyes.emplace_back(programs / "palpate-view", words, scratch / ("watch-" + std::to_string(++watched) + ".log"));
         state.notice = opening();
     }
@@ -310,7 +311,10 @@ struct Errands::Impl {
         const bool can = ::access("/usr/bin/ffmpeg", X_OK) == 0;
         made = fs::path(state.files.record).replace_extension(can ? ".mp4" : ".pictures");
         making = fs::path(made).replace_extension(".part" + made.extension().string());
-        start(film, "film", {"--replay", state.files.record, can ? "--movie" : "--offscreen", making}, "palpate-view");
+        start(
+            film, "film",
+            {"--replay", state.files.record, titleOption(chosenCase(state).title), can ? "--movie" : "--offscreen", making},
+            "palpate-view");
         state.filming = true;
     }
     void takeFilm(State& state)

@@ -45,6 +45,7 @@ Errand drawLive(State& state)
         heading(said("{}: {}", s.who.empty() ? s.session : s.who, titleOf(state, s)), 1.15F);
         if (buttonBeside(tr("Watch"))) {
             i.watched = s.session;
+            i.watchedTitle = titleOf(state, s);
             errand = Errand::watchSession;
         }
         words(said(tr("{}; {:.0f} s, inside {:.1Lf} mm, target {}, vital structure {}, force {:.1Lf} N"), s.doing,
@@ -129,6 +130,7 @@ Errand drawKept(State& state)
     }
     if (!s.record.empty() && ImGui::Button(tr("See it again"))) {
         i.watched = s.record;
+        i.watchedTitle = titleOf(state, s);
         errand = Errand::seeKept;
     }
     ImGui::Spacing();

@@ -346,10 +346,15 @@ std::vector<std::string> comparisonArguments(const State& state)
     return words;
 }
 
+std::string titleOption(const std::string& title)
+{
+    return "--title=" + title;
+}
+
 std::vector<std::string> debriefArguments(const State& state)
 {
-    Words words{{"--replay", state.files.record.string(), "--layout", "trainee", "--images",
-                 std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()}};
+    Words words{{"--replay", state.files.record.string(), titleOption(chosenCase(state).title), "--layout", "trainee",
+                 "--images", std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()}};
     words.addLook(state);
     words.add(state.from.has_value(), {"--at", fmt::format("{:.2f}", state.from.value_or(0))});
     words.add(!state.ghost.empty(), {"--ghost", state.ghost.string()});

@@ -65,7 +65,8 @@ enum class InstructorPage { live, sessions, groups };
 struct Instructor {
     InstructorPage page = InstructorPage::live;
     std::vector<LiveSession> live;
-    std::string watched;     // a session that a viewer is to be opened on
+    // A session that a viewer is to be opened on, and its heading.
+    std::string watched, watchedTitle;
     Progress everybody;      // sessions of all profiles
     std::size_t chosen = 0;  // of everybody.sessions
     std::string note;        // of the chosen one, as it is typed
@@ -188,6 +189,8 @@ const char* mainButton(const State& state) noexcept;
 std::vector<std::string> trainArguments(const State& state, const SessionFiles& files);
 /// `palpate progress --group ...` for the groups that the instructor has made; empty where one of them has nobody.
 std::vector<std::string> comparisonArguments(const State& state);
+/// Of palpate-view: what its picture is called.
+std::string titleOption(const std::string& title);
 /// `palpate-view --replay ...` for the last session.
 std::vector<std::string> debriefArguments(const State& state);
 /// `palpate train --tryout`.

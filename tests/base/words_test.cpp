@@ -36,6 +36,7 @@ TEST_F(Words, GermanHasItsOwnWordsPluralsAndNumbers)
     EXPECT_STREQ(trn("{} tick missed", "{} ticks missed", 2), "{} Takte versäumt");
     EXPECT_EQ(said(tr("inserted {:.1Lf} mm"), 12.34), "12,3 mm eingeführt");
     EXPECT_EQ(spokenHere("idc_high_grade"), "Karzinom hohen Grades");
+    EXPECT_EQ(spokenHere("rib above"), "Rippe darüber");
     EXPECT_EQ(spokenHere("something_else"), "something else");
     useLanguage("en");
     EXPECT_EQ(said(tr("inserted {:.1Lf} mm"), 12.34), "inserted 12.3 mm");

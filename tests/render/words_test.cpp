@@ -142,6 +142,22 @@ TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
     studio->resize(width, height);
 }
 
+// The scene's name is for files: who trains a case reads what that is called.
+TEST_F(WordsTest, TheHeadingIsTheTitleThatIsGivenElseTheNameOfTheScene)
+{
+    Picture& picture = studio->picture();
+    const auto heads = [&](const std::string& words) {
+        return std::ranges::count(picture.written(), words, &Written::words);
+    };
+    picture.setTitle("Stanzbiopsie");
+    studio->take(1.0, Layout::trainee, true);
+    EXPECT_GT(heads("Stanzbiopsie"), 0);
+    EXPECT_EQ(heads("test body"), 0);
+    picture.setTitle("");
+    studio->take(1.0, Layout::trainee, true);
+    EXPECT_GT(heads("test body"), 0);
+}
+
 // A body that is guided by CT, before the first scan.
 Picture& guidedByCt(Studio& studio)
 {

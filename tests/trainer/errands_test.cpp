@@ -34,6 +34,7 @@ TEST(Errands, AReplayThatFailedSaysWhy)
     SessionFolder sink(folder / "sessions");
     Errands errands(folder.path(), sink);
     State state;
+    state.cases.emplace_back();
     const auto replay = [&](const std::string& line, int status) {
         makeProgram(folder / "palpate-view", line, status);
         errands.run(Errand::startDebrief, state);

@@ -92,6 +92,14 @@ TEST(State, ANoteThatIsNotKeptYetIsThereWhenItsSessionIsChosenAgain)
     EXPECT_FALSE(hasDraft(i, i.everybody.sessions[1]));
 }
 
+TEST(State, ADebriefIsCalledAsItsCaseIs)
+{
+    State state = firstState();
+    state.cases[0].title = "- Erste Berührung";
+    const auto words = debriefArguments(state);
+    EXPECT_NE(std::ranges::find(words, "--title=- Erste Berührung"), words.end());
+}
+
 // A table stands under the choice that it is of.
 TEST(State, AComparisonGoesWhenOtherGroupsOrCasesAreChosen)
 {
