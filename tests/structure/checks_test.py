@@ -83,7 +83,7 @@ def said(script, name, text):
 def said_of_catalogue(change):
     """What check_translations says about a copy of all that it reads, after `change` of the copy's folder."""
     with tempfile.TemporaryDirectory() as folder:
-        for part in ("apps", "base", "haptics", "render", "trainer", "training/cases", "training/curricula", "datasets/tables", "scripts", "translations"):
+        for part in ("apps", "base", "haptics", "render", "trainer", "training/cases", "training/curricula", "datasets/tables", "datasets/scenes", "scripts", "translations"):
             shutil.copytree(ROOT / part, pathlib.Path(folder) / part)
         change(pathlib.Path(folder))
         return run("check_translations", folder)
@@ -101,6 +101,7 @@ CATALOGUE = [
     (lambda root: edit(root / "translations/de.po", 'msgstr "Beginnen"', 'msgstr ""'), 1, "'Start' is not translated"),
     (lambda root: edit(root / "translations/de.po", "von 100 Punkten", "von {} Punkten"), 1, "its translation"),
     (lambda root: edit(root / "training/cases/cyst/case.toml", "Reach the cyst,", "Go to the cyst,"), 1, "'Go to the cyst,"),
+    (lambda root: edit(root / "datasets/scenes/ct-core-biopsy.toml", 'structure = "lesion"', 'structure = "metastasis"'), 1, "'metastasis' is not translated"),
 ]
 
 
