@@ -1,5 +1,6 @@
 #include <render/traces.h>
 
+#include <base/said.h>
 #include <render/overlay.h>
 
 #include <fmt/format.h>
@@ -50,7 +51,7 @@ Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string
     for (int i = 0; i <= lines && d.inner.height > 1.5 * font; ++i) {
         const double value = top * i / lines;
         canvas.rectangle({static_cast<double>(d.inner.x), d.y(value)}, {static_cast<double>(d.inner.width), 1}, dark);
-        canvas.text({d.inner.x - 0.4 * font, d.y(value) - 0.5 * font}, fmt::format("{:g}", value), 0.85 * font, grey,
+        canvas.text({d.inner.x - 0.4 * font, d.y(value) - 0.5 * font}, base::said("{:Lg}", value), 0.85 * font, grey,
                     Align::right);
     }
     const std::string begin = fmt::format("-{:g} s", traceSeconds), end = base::tr("now");

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <regex>
 #include <utility>
 
 namespace palpate::render {
@@ -156,6 +157,23 @@ TEST_F(WordsTest, TheHeadingIsTheTitleThatIsGivenElseTheNameOfTheScene)
     picture.setTitle("");
     studio->take(1.0, Layout::trainee, true);
     EXPECT_GT(heads("test body"), 0);
+}
+
+// Of figures, slices and axes of traces.
+TEST_F(WordsTest, NoNumberHasADecimalPointInGerman)
+{
+    base::useLanguage("de");
+    const std::regex point("[0-9]\\.[0-9]");
+    bool comma = false;
+    for (const auto& [layout, name] : layouts) {
+        studio->take(1.0, layout, true);
+        for (const Written& w : studio->picture().written()) {
+            EXPECT_FALSE(std::regex_search(w.words, point)) << name << ": " << w.words;
+            comma = comma || w.words == "2,5";
+        }
+    }
+    base::useLanguage("en");
+    EXPECT_TRUE(comma) << "the axis of the force";
 }
 
 // A body that is guided by CT, before the first scan.
