@@ -5,13 +5,13 @@
 #include <base/temporary_folder.h>
 #include <base/user_files.h>
 #include <base/words.h>
+#include <trainer/film.h>
 #include <trainer/lists.h>
 #include <trainer/running.h>
 
 #include <unistd.h>
 
 #include <algorithm>
-#include <functional>
 #include <list>
 #include <map>
 #include <optional>
@@ -37,16 +37,6 @@ const char* opening()
 
 struct Errands::Impl {
     Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to) {}
-    ~Impl()
-    {
-        if (film) {
-            film.reset();  // ends it
-            std::error_code none;
-            fs::remove_all(making, none);
-        }
-    }
-    Impl(const Impl&) = delete;
-    Impl& operator=(const Impl&) = delete;
 
     void start(std::optional<Running>& one, const std::string& log, const std::vector<std::string>& words,
                const char* program = "palpate")
@@ -126,6 +116,21 @@ struct Errands::Impl {
             state.person.clear();
         }
     }
+    // What there was stays where the command fails.
+    void listCases(State& state)
+    {
+        if (const auto answer = answerOf(state, {"case", "list"}); !answer.is_discarded()) {
+            state.cases = casesOf(answer);
+        }
+    }
+    void listCurricula(State& state)
+    {
+        if (const auto answer = answerOf(state, {"curriculum", "list"}); !answer.is_discarded()) {
+            curricula.clear();
+            each(answer, "curricula",
+                 [this](const auto& one) { curricula.push_back(one.at("id").template get<std::string>()); });
+        }
+    }
     // A short command that writes no JSON. Returns whether it did what it was asked; else the state says why not.
     bool did(State& state, const std::vector<std::string>& arguments)
     {
@@ -186,13 +191,9 @@ struct Errands::Impl {
     }
     void loadEverybody(State& state)
     {
-        Instructor& i = state.instructor;
         listPeople(state);
-        i.groupOf.resize(state.people.size(), 0);
-        i.everybody = state.people.empty() ? Progress() : progressIn(answerOf(state, {"progress", "--all"}));
-        // The newest first.
-        std::ranges::stable_sort(i.everybody.sessions, std::greater(), &KeptSession::started);
-        chooseKept(state, std::min(i.chosen, std::max<std::size_t>(i.everybody.sessions.size(), 1) - 1));
+        const auto answer = state.people.empty() ? nlohmann::json() : answerOf(state, {"progress", "--all"});
+        everybodyLoaded(state, answer.is_discarded() ? state.instructor.everybody : progressIn(answer));
     }
     void watchSession(State& state) { watch(state, "--session"); }
     void seeKept(State& state) { watch(state, "--replay"); }
@@ -209,9 +210,11 @@ struct Errands::Impl {
         const Instructor& i = state.instructor;
         if (i.chosen < i.everybody.sessions.size()) {
             const KeptSession& s = i.everybody.sessions[i.chosen];
-            const bool done = did(state, {"profile", "note", s.name, std::to_string(s.number), "--text=" + i.note,
-                                          "--rating", std::to_string(i.rating)});
-            done ? loadEverybody(state) : void();
+            if (did(state, {"profile", "note", s.name, std::to_string(s.number), "--text=" + i.note, "--rating",
+                            std::to_string(i.rating)})) {
+                noteKept(state);
+                loadEverybody(state);
+            }
         }
     }
     void compareGroups(State& state)
@@ -233,24 +236,25 @@ struct Errands::Impl {
         }
     }
     // Looks at the sessions that run as long as somebody looks at them.
-    void lookAtLive(State& state)
+    bool lookAtLive(State& state)
     {
         const bool wanted = state.screen == Screen::instructor && state.instructor.page == InstructorPage::live;
         if (!wanted) {
             live.reset();
             state.instructor.live.clear();
-            return;
+            return false;
         }
         const fs::path file = scratch / "live.json";
+        std::error_code none;
         if (!live || live->ended()) {
-            fs::remove(file);
+            fs::remove(file, none);
             start(live, "live", {"sessions", "--every", "0.5", "--json", file});
         }
-        std::error_code none;
         if (const auto written = fs::last_write_time(file, none); !none && written != liveRead) {
             liveRead = written;
             state.instructor.live = liveIn(parsed(file));
         }
+        return false;
     }
     void addPerson(State& state)
     {
@@ -305,31 +309,10 @@ struct Errands::Impl {
         besideExpert = state.files.record;
         state.ghosting = true;
     }
-    // With ffmpeg a film, without it pictures. It has its name when it is whole: what is cut off does not look like one.
     void makeFilm(State& state)
     {
-        const bool can = ::access("/usr/bin/ffmpeg", X_OK) == 0;
-        made = fs::path(state.files.record).replace_extension(can ? ".mp4" : ".pictures");
-        making = fs::path(made).replace_extension(".part" + made.extension().string());
-        start(
-            film, "film",
-            {"--replay", state.files.record, titleOption(chosenCase(state).title), can ? "--movie" : "--offscreen", making},
-            "palpate-view");
+        film.make(programs, state.files.record, titleOption(chosenCase(state).title), scratch / "film.log");
         state.filming = true;
-    }
-    void takeFilm(State& state)
-    {
-        std::error_code failed;
-        if (film->failed()) {
-            state.notice = film->message();
-            fs::remove_all(making, failed);
-        } else {
-            fs::remove_all(made, failed);
-            fs::rename(making, made, failed);
-            state.notice = failed ? made.string() + ": " + failed.message() : made.string();
-        }
-        state.filming = false;
-        film.reset();
     }
     void keepSettings(State& state)
     {
@@ -338,7 +321,7 @@ struct Errands::Impl {
     }
 
     // Hears a device's buttons as long as they work the window. The file of a firmware is taken once it is typed.
-    void lookAtGrip(State& state)
+    bool lookAtGrip(State& state)
     {
         if (listensToGrip(state) && !devices) {
             firmware = state.screen == Screen::devices ? firmware : state.firmware;
@@ -347,6 +330,71 @@ struct Errands::Impl {
             grip.letGo();
         }
         state.gripReady = grip.ready();
+        return false;
+    }
+
+    bool lookAtDevices(State& state)
+    {
+        if (!devices || !devices->ended()) {
+            return false;
+        }
+        devices.reset();
+        state.devices = readDevices(scratch / "devices.json");
+        state.useFalcon = state.useFalcon && state.devices.falconReady;
+        return true;
+    }
+
+    bool lookAtSession(State& state)
+    {
+        if (!session || !session->ended()) {
+            return false;
+        }
+        Result result = readResult(state.files.figures);
+        const bool scored = result.problem.empty();
+        if (!scored) {
+            const std::string said = session->message();
+            result.problem = said.empty() || result.untouched ? result.problem : said;
+        } else {
+            result.fault = result.fault.empty() && session->failed() ? session->message() : result.fault;
+        }
+        session.reset();
+        sessionEnded(state, result);  // also where it cannot be kept
+        if (scored) {
+            sink.keep(chosenCase(state), state.files, result);
+        }
+        return true;
+    }
+
+    bool lookAtReplay(State& state)
+    {
+        if (!replay || !replay->ended()) {
+            return false;
+        }
+        if (replay->failed()) {
+            state.notice = replay->message();
+            forgetExpert(state);
+        }
+        replay.reset();
+        state.replaying = false;
+        return true;
+    }
+
+    void takeExpert(State& state)
+    {
+        const bool failed = expert->failed();
+        state.notice = failed ? expert->message() : "";
+        state.ghosting = false;
+        expert.reset();
+        std::error_code gone;
+        if (!failed) {
+            fs::rename(expertOf.string() + ".part", expertOf, gone);
+            state.notice = gone ? expertOf.string() + ": " + gone.message() : "";
+        }
+        // Whoever has gone on in the meantime did not ask for this any more.
+        if (!failed && !gone && state.screen == Screen::result && state.files.record == besideExpert && !replay) {
+            state.ghost = expertOf;
+            startDebrief(state);
+        }
     }
 
     // What has ended of all that is beside a session.
@@ -369,17 +417,7 @@ struct Errands::Impl {
             state.trying = false;
         }
         if (over(expert)) {
-            state.notice = expert->failed() ? expert->message() : "";
-            state.ghosting = false;
-            if (!expert->failed()) {
-                fs::rename(expertOf.string() + ".part", expertOf);
-            }
-            // Whoever has gone on in the meantime did not ask for this any more.
-            if (!expert->failed() && state.screen == Screen::result && state.files.record == besideExpert && !replay) {
-                state.ghost = expertOf;
-                startDebrief(state);
-            }
-            expert.reset();
+            takeExpert(state);
         }
         eyes.remove_if([&](Running& one) {
             const bool ended = one.ended();
@@ -389,19 +427,21 @@ struct Errands::Impl {
             changed = changed || ended;
             return ended;
         });
-        if (over(film)) {
-            takeFilm(state);
+        if (film.ended()) {
+            state.notice = film.take();
+            state.filming = false;
+            changed = true;
         }
         return changed;
     }
 
     fs::path expertOf, besideExpert;  // record of the expert that is made, and of the session that it is for
-    fs::path made, making;            // film or pictures: when they are whole, and until then
     fs::path programs;
     const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
     ResultSink& sink;
     std::vector<std::string> curricula;  // that there are
-    std::optional<Running> session, devices, replay, push, tryout, expert, film, live;
+    std::optional<Running> session, devices, replay, push, tryout, expert, live;
+    Film film;
     bool ending = false;  // the session was told to end
     fs::file_time_type liveRead;
     std::list<Running> eyes;  // viewers of the instructor
@@ -417,12 +457,10 @@ Errands::~Errands() = default;
 void Errands::list(State& state)
 {
     try {
-        state.cases = casesOf(impl_->answerOf(state, {"case", "list"}));
+        impl_->listCases(state);
         state.person = state.settings.person;
         impl_->listPeople(state);
-        impl_->curricula.clear();
-        each(impl_->answerOf(state, {"curriculum", "list"}), "curricula",
-             [this](const auto& one) { impl_->curricula.push_back(one.at("id").template get<std::string>()); });
+        impl_->listCurricula(state);
         impl_->choosePerson(state);
         const std::string why = whyNoSessions(impl_->sink.folder());
         state.notice += (state.notice.empty() || why.empty() ? "" : "\n") + why;
@@ -469,37 +507,17 @@ std::vector<Press> Errands::pressed()
 
 bool Errands::look(State& state)
 {
+    using Look = bool (Impl::*)(State&);
     bool changed = false;
-    if (impl_->devices && impl_->devices->ended()) {
-        impl_->devices.reset();
-        state.devices = readDevices(impl_->scratch / "devices.json");
-        state.useFalcon = state.useFalcon && state.devices.falconReady;
-        changed = true;
-    }
-    if (impl_->session && impl_->session->ended()) {
-        Result result = readResult(state.files.figures);
-        if (!result.problem.empty()) {
-            const std::string said = impl_->session->message();
-            result.problem = said.empty() || result.untouched ? result.problem : said;
-        } else {
-            result.fault = result.fault.empty() && impl_->session->failed() ? impl_->session->message() : result.fault;
-            impl_->sink.keep(chosenCase(state), state.files, result);
+    for (const Look part : {&Impl::lookAtDevices, &Impl::lookAtSession, &Impl::lookAtHelpers, &Impl::lookAtLive,
+                            &Impl::lookAtGrip, &Impl::lookAtReplay}) {
+        try {
+            changed = ((*impl_).*part)(state) || changed;
+        } catch (const std::exception& e) {
+            // A session that runs goes on.
+            changed = changed || state.notice != e.what();
+            state.notice = e.what();
         }
-        impl_->session.reset();
-        sessionEnded(state, std::move(result));
-        changed = true;
-    }
-    changed = impl_->lookAtHelpers(state) || changed;
-    impl_->lookAtLive(state);
-    impl_->lookAtGrip(state);
-    if (impl_->replay && impl_->replay->ended()) {
-        if (impl_->replay->failed()) {
-            state.notice = impl_->replay->message();
-            impl_->forgetExpert(state);
-        }
-        impl_->replay.reset();
-        state.replaying = false;
-        changed = true;
     }
     return changed;
 }

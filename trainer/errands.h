@@ -23,7 +23,8 @@ public:
     void list(State& state);
     /// Never throws for what the user can mend: that stands in the state's notice.
     void run(Errand errand, State& state);
-    /// Looks what has ended, and tells the state. To be called often. Returns whether something changed.
+    /// Looks what has ended, and tells the state. To be called often. Returns whether something changed. Never throws for
+    /// what went wrong outside: that stands in the state's notice.
     bool look(State& state);
     /// What was pressed at a device's grip since this was last called.
     std::vector<Press> pressed();

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <functional>
 #include <tuple>
 #include <utility>
 
@@ -266,6 +267,31 @@ void noteTyped(State& state)
     } else {
         i.drafts.erase({s.name, s.number});
     }
+}
+
+void noteKept(State& state)
+{
+    Instructor& i = state.instructor;
+    assert(i.chosen < i.everybody.sessions.size());
+    KeptSession& s = i.everybody.sessions[i.chosen];
+    s.note = i.note;
+    s.rating = i.rating;
+    noteTyped(state);
+}
+
+void everybodyLoaded(State& state, Progress everybody)
+{
+    Instructor& i = state.instructor;
+    i.groupOf.resize(state.people.size(), 0);
+    std::ranges::stable_sort(everybody.sessions, std::greater(), &KeptSession::started);
+    const auto before = std::exchange(i.everybody, std::move(everybody)).sessions;
+    const auto& sessions = i.everybody.sessions;
+    // By name and number: other sessions may have ended meanwhile.
+    const auto same = [&](const KeptSession& s) {
+        return i.chosen < before.size() && s.name == before[i.chosen].name && s.number == before[i.chosen].number;
+    };
+    const auto at = static_cast<std::size_t>(std::ranges::find_if(sessions, same) - sessions.begin());
+    chooseKept(state, at < sessions.size() ? at : std::min(i.chosen, std::max<std::size_t>(sessions.size(), 1) - 1));
 }
 
 bool hasDraft(const Instructor& instructor, const KeptSession& session)

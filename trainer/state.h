@@ -164,6 +164,11 @@ void chooseKept(State& state, std::size_t session);
 /// Instructor's screen: note or rating of the chosen session may have changed. Until it is kept it stays, whatever else is
 /// chosen.
 void noteTyped(State& state);
+/// Instructor's screen: note and rating of the chosen session, as they were typed, are kept.
+/// @pre  there is one
+void noteKept(State& state);
+/// What `palpate progress --all` has learnt, the newest session first. The chosen session stays chosen.
+void everybodyLoaded(State& state, Progress everybody);
 /// Whether something that was typed for this session is not kept yet.
 bool hasDraft(const Instructor& instructor, const KeptSession& session);
 /// Instructor's screen: a person goes into a group (1 or 2), or into none (0). A comparison of other groups goes.

@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -15,16 +17,33 @@ using tests::Folder;
 
 namespace {
 
-void makeScript(const std::filesystem::path& file, const std::string& script)
+void makeScript(const std::filesystem::path& file, const std::string& lines)
 {
-    std::ofstream(file) << "#!/bin/sh\n" << script;
+    std::ofstream(file) << "#!/bin/sh\n" << lines << "\n";
     std::filesystem::permissions(file, std::filesystem::perms::owner_all);
 }
 
 // A program that prints a line, and ends with this status.
 void makeProgram(const std::filesystem::path& file, const std::string& line, int status)
 {
-    makeScript(file, "echo '" + line + "' >&2\nexit " + std::to_string(status) + "\n");
+    makeScript(file, "echo '" + line + "' >&2\nexit " + std::to_string(status));
+}
+
+// As the window does it, until this holds.
+void lookUntil(Errands& errands, State& state, const std::function<bool()>& holds)
+{
+    for (int i = 0; !holds() && i < 1000; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        errands.look(state);
+    }
+    EXPECT_TRUE(holds());
+}
+
+CaseEntry caseCalled(const std::string& id)
+{
+    CaseEntry c;
+    c.id = id;
+    return c;
 }
 
 // The debrief's window cannot say itself why it did not open.
@@ -38,10 +57,7 @@ TEST(Errands, AReplayThatFailedSaysWhy)
     const auto replay = [&](const std::string& line, int status) {
         makeProgram(folder / "palpate-view", line, status);
         errands.run(Errand::startDebrief, state);
-        for (int i = 0; state.replaying && i < 1000; ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-            errands.look(state);
-        }
+        lookUntil(errands, state, [&] { return !state.replaying; });
         return state.notice;
     };
     const std::string why = "palpate-view: --ghost e.db: is a session in another body";
@@ -56,7 +72,7 @@ TEST(Errands, AHomeThatCannotBeWrittenIsSaidInWords)
     std::ofstream(folder / "file") << "";
     makeScript(folder / "palpate",
                "if [ $1 = profile ]; then echo 'palpate: this folder cannot be made' >&2; exit 1; fi\n"
-               "for file; do :; done; echo '{}' >\"$file\"\n");
+               "for file; do :; done; echo '{}' >\"$file\"");
     SessionFolder sink(folder / "file/palpate/sessions");
     Errands errands(folder.path(), sink);
     State state;
@@ -67,6 +83,128 @@ TEST(Errands, AHomeThatCannotBeWrittenIsSaidInWords)
     before != nullptr ? ::setenv("XDG_DATA_HOME", kept.c_str(), 1) : ::unsetenv("XDG_DATA_HOME");
     EXPECT_NE(state.notice.find("no profiles can be kept"), std::string::npos) << state.notice;
     EXPECT_NE(state.notice.find("--sessions"), std::string::npos) << state.notice;
+}
+
+// A command that fails, e.g. without space on the disk, takes nothing from the window.
+TEST(Errands, WhatWasListedStaysWhereTheNextListFails)
+{
+    const Folder folder;
+    const auto broken = [&](const std::string& command) { return folder.path() / ("broken-" + command); };
+    makeScript(folder / "palpate", "cd '" + folder.path().string() + R"('
+test -e broken-$1 && exit 1
+test $1 = progress && echo "$@" > asked
+for last; do :; done
+echo '{"cases": [{"id": "a", "title": "A", "picture": "", "difficulty": 1, "trains": [], "measures": [], "briefing": []}],
+       "profiles": [{"name": "ada", "hand": "left"}], "curricula": [{"id": "basics"}], "sessions": [{"name": "ada",
+       "session": 1, "started": "", "case": "a", "scene": "", "record": "", "note": "", "rating": 0, "mode": "test",
+       "measures": {}}]}' > "$last")");
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.settings.person = "ada";
+    const auto isWhole = [&] {
+        std::ifstream asked(folder / "asked");
+        std::string words;
+        std::getline(asked, words);
+        EXPECT_NE(words.find("--curriculum basics"), std::string::npos) << words;
+        EXPECT_EQ(state.cases.size(), 1U);
+        EXPECT_EQ(state.people.size(), 1U);
+        EXPECT_EQ(state.instructor.everybody.sessions.size(), 1U);
+    };
+    errands.run(Errand::loadEverybody, state);
+    errands.list(state);
+    isWhole();
+    for (const char* const command : {"case", "profile", "curriculum", "progress"}) {
+        std::ofstream(broken(command)) << "\n";
+        errands.run(Errand::loadEverybody, state);
+        errands.list(state);
+        isWhole();
+        std::filesystem::remove(broken(command));
+    }
+}
+
+TEST(Errands, AKeptNoteIsNoDraftThoughANewerSessionHasEnded)
+{
+    const Folder folder;
+    const std::string end = R"(, "case": "a", "scene": "", "record": "", "rating": 0, "mode": "test", "measures": {}})";
+    const auto session = [&](const std::string& number, const std::string& note) {
+        return R"({"name": "ada", "session": )" + number + R"(, "note": ")" + note + R"(", "started": ")" + number + "\"" +
+               end;
+    };
+    const auto progress = [&](const std::string& sessions) {
+        makeScript(folder / "palpate",
+                   "for last; do :; done\ntest $2 = note || echo '{\"profiles\": [{\"name\": \"ada\", "
+                   "\"hand\": \"left\"}], \"sessions\": [" +
+                       sessions + "]}' > \"$last\"");
+    };
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    progress(session("1", ""));
+    errands.run(Errand::loadEverybody, state);
+    ASSERT_EQ(state.instructor.everybody.sessions.size(), 1U) << state.notice;
+    state.instructor.note = "look at the probe";
+    noteTyped(state);
+    progress(session("1", "look at the probe") + ", " + session("2", ""));
+    errands.run(Errand::keepNote, state);
+    EXPECT_TRUE(state.instructor.drafts.empty());
+    EXPECT_EQ(state.instructor.everybody.sessions.at(state.instructor.chosen).number, 1);
+    EXPECT_EQ(state.instructor.note, "look at the probe");
+}
+
+// The window says what went wrong, and what else runs goes on.
+TEST(Errands, WhatFailsWhileItLooksIsSaid)
+{
+    const Folder folder;
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.cases = {caseCalled("a")};
+    state.screen = Screen::result;
+    state.files.record = folder / "a.db";
+    makeScript(folder / "palpate", "for last; do :; done\n: > \"$last\"");  // and there is no viewer
+    errands.run(Errand::seeExpert, state);
+    ASSERT_TRUE(state.ghosting) << state.notice;
+    lookUntil(errands, state, [&] { return !state.ghosting; });
+    EXPECT_NE(state.notice.find("palpate-view"), std::string::npos) << state.notice;
+    EXPECT_TRUE(std::filesystem::exists(folder / "expert-a.db")) << "the expert's session is kept";
+    EXPECT_FALSE(state.replaying);
+
+    std::filesystem::remove(folder / "palpate");
+    state.notice.clear();
+    state.listening = true;
+    EXPECT_TRUE(errands.look(state)) << "to the grip";
+    EXPECT_NE(state.notice.find("palpate: cannot be started"), std::string::npos) << state.notice;
+    EXPECT_FALSE(errands.look(state)) << "that is no news";
+}
+
+// Keeps nothing.
+struct FullSink : SessionFolder {
+    using SessionFolder::SessionFolder;
+    void keep(const CaseEntry&, const SessionFiles&, const Result&) override
+    {
+        throw std::runtime_error("the disk is full");
+    }
+};
+
+TEST(Errands, ASessionThatCannotBeKeptHasEnded)
+{
+    const Folder folder;
+    makeScript(folder / "palpate", R"(for last; do :; done
+echo '{"score": {"total": 71, "points": {"core": 50, "vital": 21, "technique": 0}}}' > "$last")");
+    FullSink sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.cases = {caseCalled("a")};
+    errands.run(Errand::startSession, state);
+    ASSERT_TRUE(state.running) << state.notice;
+    lookUntil(errands, state, [&] { return !state.running; });
+    EXPECT_EQ(state.screen, Screen::result);
+    EXPECT_EQ(state.result.total, 71);
+    EXPECT_EQ(state.notice, "the disk is full");
+    state.notice.clear();
+    errands.look(state);
+    EXPECT_EQ(state.notice, "") << "it is said once";
 }
 
 }  // namespace

@@ -86,9 +86,7 @@ TEST(State, ANoteThatIsNotKeptYetIsThereWhenItsSessionIsChosenAgain)
     chooseKept(state, 1);
     EXPECT_EQ(i.note, "look at the probe");
     EXPECT_EQ(i.rating, 4);
-    i.everybody.sessions[1].note = i.note;  // kept
-    i.everybody.sessions[1].rating = i.rating;
-    noteTyped(state);
+    noteKept(state);
     EXPECT_FALSE(hasDraft(i, i.everybody.sessions[1]));
 }
 
