@@ -340,8 +340,10 @@ void bindVolume(py::module_& module)
         .def(
             "save",
             [](VolumeBox& box, const Path& file) {
-                const py::gil_scoped_release others;
-                box.tissue->save(file);
+                {
+                    const py::gil_scoped_release others;
+                    box.tissue->save(file);
+                }
                 box.file = std::filesystem::absolute(file);
             },
             py::arg("file"))

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pathlib
 import shutil
 import subprocess
 
@@ -23,11 +24,7 @@ def accuracy(file=None, *, command=None):
     from . import Error
 
     if file is not None:
-        with open(os.fspath(file), encoding="utf-8") as text:
-            try:
-                figures = json.load(text)
-            except ValueError as error:
-                raise Error(f"{file}: is no JSON ({error}): give what `palpate accuracy --json` wrote") from None
+        source, text = file, pathlib.Path(file).read_bytes()
     else:
         program = command or shutil.which("palpate")
         if program is None:
@@ -35,7 +32,11 @@ def accuracy(file=None, *, command=None):
         done = subprocess.run([os.fspath(program), "accuracy", "--json", "-"], capture_output=True, text=True)
         if done.returncode != 0:
             raise Error(done.stderr.strip() or f"palpate accuracy: exit status {done.returncode}")
-        figures = json.loads(done.stdout)
+        source, text = f"{program} accuracy", done.stdout
+    try:
+        figures = json.loads(text)
+    except ValueError as error:
+        raise Error(f"{source}: is no JSON ({error}): give what `palpate accuracy --json` wrote") from None
     if not isinstance(figures, dict) or not {"verification", "chart"} <= figures.keys():
-        raise Error(f"{file}: has no figures of accuracy: give what `palpate accuracy --json` wrote")
+        raise Error(f"{source}: has no figures of accuracy: give what `palpate accuracy --json` wrote")
     return figures

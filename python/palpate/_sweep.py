@@ -5,6 +5,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -95,15 +96,17 @@ class SweepResult:
         return pandas.DataFrame(self.rows)
 
 
+# Numbers as table.csv has them: what else int() and float() take ("1_000", "007", "nan") is a word of an axis.
+_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?(e[+-][0-9]+)?")
+
+
 def _number(text):
     if text == "":
         return None
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            pass
-    return text
+    number = _NUMBER.fullmatch(text)
+    if number is None:
+        return text
+    return float(text) if number[1] or number[2] else int(text)
 
 
 def _work(folder, plan, jobs, retry, progress):

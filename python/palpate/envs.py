@@ -273,7 +273,9 @@ def _serve(pipe, make, numbers, seed):
             if what == "reset":
                 if argument is not None:
                     streams = [np.random.SeedSequence(argument, spawn_key=(n,)) for n in numbers]
-                pipe.send([env.reset(seed=int(s.generate_state(1)[0])) for env, s in zip(envs, streams)])
+                # Only the first episode needs its seed: those after it follow from the one before.
+                pipe.send([env.reset(seed=s and int(s.generate_state(1)[0])) for env, s in zip(envs, streams)])
+                streams = [None] * len(envs)
             elif what == "step":
                 pipe.send([_step(env, action) for env, action in zip(envs, argument)])
             else:
@@ -339,7 +341,7 @@ class Vector:
             raise
 
     def reset(self, *, seed=None):
-        """Begins all episodes. Returns count x 16 observations."""
+        """Begins all episodes; without a seed they follow from those before. Returns count x 16 observations."""
         return np.stack([observation for observation, _ in self._ask([("reset", seed)] * len(self._parts))])
 
     def step(self, actions):

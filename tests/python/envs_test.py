@@ -304,6 +304,14 @@ class Vectors(unittest.TestCase):
                 with self.subTest(name, value=value), self.assertRaisesRegex(error, name):
                     envs.Vector(*words, **options).close()
 
+    def test_a_reset_goes_on_and_a_seed_repeats(self):
+        with envs.Vector(2, make, processes=2, seed=11) as vector:
+            first, second = vector.reset(), vector.reset()
+            self.assertFalse(np.array_equal(first, second))
+            self.assertFalse(np.array_equal(second, vector.reset()))
+            np.testing.assert_array_equal(vector.reset(seed=11), first)
+            np.testing.assert_array_equal(vector.reset(), second)
+
     def test_an_error_in_a_process_comes_here(self):
         with self.assertRaisesRegex(palpate.Error, "no needle"):
             envs.Vector(1, functools.partial(envs.Biopsy, "block"), processes=1)

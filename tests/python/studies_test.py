@@ -87,6 +87,15 @@ class Sweeps(InFolder):
         done = len(palpate.SweepResult(self.folder / "s"))
         self.assertTrue(2 <= done < 400, done)
 
+    def test_a_word_of_an_axis_stays_as_it_is(self):
+        words = ["1_000", "007", "nan", "infinity", "inf", "-inf", " 1", "+1", "1.", ".5", "1e5", "٣", "true"]
+        numbers = {"0": 0, "-12": -12, "0.5": 0.5, "-1.25e-07": -1.25e-07, "1e+20": 1e20, "9007199254740993": 9007199254740993}
+        (self.folder / "table.csv").write_text(
+            "word,error\n" + "".join(f"{word},\n" for word in [*words, *numbers, ""]), encoding="utf-8")
+        read = palpate.SweepResult(self.folder)["word"]
+        self.assertEqual(read, [*words, *numbers.values(), None])
+        self.assertEqual([type(v) for v in read[len(words):-1]], [type(v) for v in numbers.values()])
+
     def test_outputs_are_listed(self):
         self.assertIn("force_n", palpate.sweep_outputs()["press"])
 
@@ -118,6 +127,14 @@ class Accuracy(InFolder):
         file.write_text("x")
         with self.assertRaisesRegex(palpate.Error, "no JSON"):
             palpate.accuracy(file)
+
+    def test_a_program_that_is_another_is_named(self):
+        other = self.folder / "other"
+        for says, error in (("{}", "other accuracy: has no figures"), ("x", "other accuracy: is no JSON")):
+            other.write_text(f"#!/bin/sh\necho '{says}'\n")
+            other.chmod(0o755)
+            with self.subTest(says), self.assertRaisesRegex(palpate.Error, error):
+                palpate.accuracy(command=other)
 
 
 if __name__ == "__main__":
