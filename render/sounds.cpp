@@ -61,12 +61,14 @@ Sounds::~Sounds()
 
 void Sounds::heed(const channel::State& state)
 {
-    if (const auto before = std::exchange(last_, state.warning); state.warning <= before)
+    if (state.warning <= last_) {
+        last_ = state.warning;
         return;
+    }
     const std::unique_lock lock(guard_, std::try_to_lock);
     if (!lock)
-        return;
-    wanted_ = state.warning;
+        return;  // the next state has its warning too
+    last_ = wanted_ = state.warning;
     wake_.notify_one();
 }
 
