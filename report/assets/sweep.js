@@ -47,6 +47,8 @@ const axisStyle = () => ({
   nameTextStyle: { color: colour("soft") }, nameLocation: "middle", axisLabel: { color: colour("soft") },
   axisLine: { lineStyle: { color: colour("line") } }, splitLine: { lineStyle: { color: colour("grid") } },
 });
+// A tooltip is HTML; names and words of a plan are not.
+const html = (text) => String(text).replace(/[&<>"']/g, (c) => `&#${c.charCodeAt(0)};`);
 const tip = () => ({ backgroundColor: colour("card"), borderColor: colour("line"), textStyle: { color: colour("ink"), fontSize: 12.5 } });
 
 // Ends of an axis of numbers. ECharts would end a logarithmic one at powers of ten below the values.
@@ -133,7 +135,7 @@ function drawCurve(o, a, b) {
   chart("curve", {
     grid: { left: 74, right: 24, top, bottom: 92 },
     legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: legend.names },
-    tooltip: { trigger: "item", ...tip(), formatter: (p) => `${p.marker}${p.seriesName}<br>${names[a]}: ${axis.words ? steps[p.value[0]]?.label ?? p.name : short(p.value[0])}<br>median ${short(p.value[1])}, middle half ${short(p.data.low)} to ${short(p.data.high)}, ${p.data.n} cases` },
+    tooltip: { trigger: "item", ...tip(), formatter: (p) => `${p.marker}${html(p.seriesName)}<br>${html(names[a])}: ${axis.words ? html(steps[p.value[0]]?.label ?? p.name) : short(p.value[0])}<br>median ${short(p.value[1])}, middle half ${short(p.data.low)} to ${short(p.data.high)}, ${p.data.n} cases` },
     xAxis: { ...axisStyle(), name: names[a], nameGap: 28, ...x },
     yAxis: { ...axisStyle(), name: data.outputs[o], nameGap: 54, type: "value", scale: true },
     dataZoom: axis.words ? [] : [{ type: "slider", height: 18, bottom: 12, textStyle: { color: colour("soft") }, labelFormatter: (v) => short(v) }, { type: "inside" }],
@@ -157,7 +159,7 @@ function drawMap(o, a, b) {
   byId("fields").textContent = numbered ? "" : " Point at a field to read its value.";
   chart("map", {
     grid: { left, right, top: 16, bottom: narrow ? 100 : 56 },
-    tooltip: { ...tip(), formatter: (p) => `${names[a]} ${across[p.value[0]].label}, ${names[b]} ${up[p.value[1]].label}<br>${data.outputs[o]}: ${short(p.value[2])} (${p.value[3]} cases)` },
+    tooltip: { ...tip(), formatter: (p) => `${html(names[a])} ${html(across[p.value[0]].label)}, ${html(names[b])} ${html(up[p.value[1]].label)}<br>${html(data.outputs[o])}: ${short(p.value[2])} (${p.value[3]} cases)` },
     xAxis: { ...axisStyle(), type: "category", name: names[a], nameGap: 30, data: across.map((l) => l.label) },
     yAxis: { ...axisStyle(), type: "category", name: names[b], nameGap: left - 26, axisLabel: { color: colour("soft"), width: beside + 10, overflow: "truncate" }, data: up.map((l) => l.label) },
     visualMap: {
@@ -180,7 +182,7 @@ function drawRank(o) {
   const labels = bars.map((e) => inLines(e.axis, 0.4 * width)), most = Math.max(1, ...labels.map((l) => l.split("\n").length));
   chart("rank", {
     grid: { left: 8, right: 40, top: 6, bottom: 4, containLabel: true },
-    tooltip: { ...tip(), formatter: (p) => `${bars[p.dataIndex].axis}: ${short(p.value)}` },
+    tooltip: { ...tip(), formatter: (p) => `${html(bars[p.dataIndex].axis)}: ${short(p.value)}` },
     xAxis: { ...axisStyle(), type: "value", min: 0, splitNumber: Math.max(1, Math.min(5, Math.floor(width / 120))) },
     yAxis: { ...axisStyle(), type: "category", data: labels, axisLabel: { color: colour("soft"), interval: 0, lineHeight } },
     series: [{ type: "bar", data: bars.map((e) => Math.max(e.values[0] ?? 0, 0)), itemStyle: { color: colour("accent") }, barMaxWidth: 26 }],

@@ -165,6 +165,31 @@ TEST(SweepReport, NoTextsOfANarrowPageLieOnEachOther)
     EXPECT_GE(countOf(partOf(page, "rank"), ">youngs_modulus"), 1U);
 }
 
+// ECharts takes what a tooltip says as HTML. Names of a plan of somebody else's are none.
+TEST(SweepReport, ATooltipShowsNamesAsTheyAre)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    std::string text = readText(reportWith(here, 3, "youngs_kpa", "youngs_kpa"));
+    for (const std::string name : {"youngs_kpa", "depth_mm", "force_n"}) {
+        for (auto at = text.find('"' + name + '"'); at != std::string::npos; at = text.find('"' + name + '"', at)) {
+            text.insert(at + 1, "\\u003ci class=it\\u003e");
+        }
+    }
+    const std::string point = "dispatchAction({ type: \"showTip\", dataIndex: 0, seriesIndex: ";
+    text.insert(text.find("</body>"), "<script>charts.curve." + point + "1 }); charts.map." + point + "0 }); charts.rank." +
+                                          point + "0 });</script>");
+    writeText(here / "named.html", text);
+    const std::string page = documentOf("file://" + std::string(here / "named.html"), here / "profile");
+    for (const char* const part : {"curve", "map", "rank"}) {
+        const std::string chart = partOf(page, part), tip = chart.substr(0, chart.find("<p class=\"note\""));
+        EXPECT_NE(tip.find("&lt;i class=it&gt;", tip.rfind("</svg>")), std::string::npos) << part << ": no tooltip";
+    }
+    EXPECT_EQ(page.find("<i class=\"it\""), std::string::npos);
+}
+
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.
 TEST(SweepReport, IsDrawnByABrowserFromOneFile)
 {
