@@ -90,6 +90,18 @@ void checkOptions(ExportArguments& o)
     base::checkOutputs({o.output, volume::exportedDataOf(o.output), o.map, o.json}, {o.volume, o.record, o.like});
 }
 
+// What would change nothing in what is written is a mistake.
+void checkUse(const CLI::App& command, const ExportArguments& o)
+{
+    const auto refuse = [&](const char* option, bool used, const char* why) {
+        base::failIf(command.count(option) > 0 && !used, "{}: {}: leave it out", option, why);
+    };
+    const bool ct = o.what == "ct", picture = o.what == "ultrasound" && o.like.empty();
+    refuse("--width", picture, "is for an ultrasound picture, and not with --like");
+    refuse("--height", ct || picture, "is for a CT scan or an ultrasound picture, and not with --like");
+    refuse("--window", ct, "is for a CT scan");
+}
+
 double timeFrom(const std::string& text)
 {
     const auto plain = base::timeOf(text + "s");
@@ -226,9 +238,10 @@ std::string exportUltrasound(const ExportArguments& o, const std::function<void(
                        1e3F * image.settings.depth);
 }
 
-void runExport(ExportArguments o)
+void runExport(const CLI::App& app, ExportArguments o)
 {
     checkOptions(o);
+    checkUse(app, o);
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("reading");
     volume::ExportOptions how;
@@ -283,7 +296,7 @@ void addExport(CLI::App& app)
     command::addNumber(*command, "--height", o->height,
                        "Height of an ultrasound picture, or of a slice of a CT scan [pixels]", 100, 8192);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
-    command->final_callback([o] { runExport(*o); });
+    command->final_callback([o, command] { runExport(*command, *o); });
 }
 
 }  // namespace palpate::apps

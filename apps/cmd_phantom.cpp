@@ -2,6 +2,7 @@
 #include <base/error.h>
 #include <base/memory.h>
 #include <base/outputs.h>
+#include <base/split.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <datasets/phantom.h>
@@ -53,13 +54,9 @@ void applySetting(datasets::PhantomSpec& spec, const std::string& setting)
             return;
         }
     }
-    std::size_t read = 0;
-    try {
-        spec.numbers[key] = std::stod(value, &read);
-    } catch (const std::exception&) {
-        read = 0;
-    }
-    base::failIf(read == 0 || read != value.size(), "--set {}: '{}' is not a number", setting, value);
+    const auto number = base::numberIn(value);
+    base::failIf(!number, "--set {}: '{}' is not a number", setting, value);
+    spec.numbers[key] = *number;
 }
 
 nlohmann::json figures(const volume::Tissue& tissue, double seconds)

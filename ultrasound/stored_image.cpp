@@ -1,6 +1,7 @@
 #include <ultrasound/stored_image.h>
 
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/png.h>
 
 #include <nlohmann/json.hpp>
@@ -90,6 +91,8 @@ std::string storedImage(const BeamImage& image, int width, int height)
 
 StoredHow readStored(const std::filesystem::path& file)
 {
+    const std::string why = base::whyNoFile(file);
+    base::failIf(!why.empty(), "{}: {}", file.native(), why);
     std::ifstream in(file, std::ios::binary);
     const std::string png((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     base::failIf(!in, "{}: cannot be read", file.native());

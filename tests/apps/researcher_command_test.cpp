@@ -282,6 +282,15 @@ TEST_F(Researcher, AnExportIsImportedAgainAsItWas)
     expectRefusal({"export", vdb, "-o", folder / "e.jpg"}, "is no format that is written");
     expectRefusal({"export", vdb, "-o", folder / "e.png"}, "needs a session");
     expectRefusal({"export", vdb, "-o", folder / "e.vtu"}, "needs a session");
+    const std::vector<std::string> scan{"export", "--record", folder / "r.db",  "--at",
+                                        "1s",     "-o",       folder / "e.png", "--what"};
+    const std::vector<std::vector<std::string>> ignored{{"ct", "--width", "900"}, {"ultrasound", "--window", "bone"}};
+    for (const auto& more : ignored) {
+        std::vector<std::string> words = scan;
+        words.insert(words.end(), more.begin(), more.end());
+        expectRefusal(words, more[1] + ": is for");
+    }
+    expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--height", "900"}, "--height: is for");
     expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--what", "image"}, "holds no image");
 }
 

@@ -53,6 +53,9 @@ TEST(VolumeCommands, APhantomsVolumeSaysWhatThePhantomSaid)
     expectVolumeKeys(info);
     EXPECT_EQ(voxels(info), voxels(made));
     EXPECT_EQ(info.at("size"), made.at("size"));
+    for (const char* const value : {"0x20", " 20", "20 ", "20mm", ""}) {
+        expectRefusal({"phantom", "layered", "-o", file, "--set", std::string("fat_mm=") + value}, "is not a number");
+    }
 }
 
 // Cut anywhere, a volume is refused; what is left of it never becomes tissue.

@@ -55,7 +55,10 @@ TEST(StoredImage, RefusesWhatIsNoneOfOurs)
     const tests::Folder folder;
     const auto file = folder.path() / "us.png";
     const std::string whole = storedImage(example(), 64, 48);
-    EXPECT_NE(tests::errorOf([&] { readStored(folder.path() / "none.png"); }).find("cannot be read"), std::string::npos);
+    const auto none = folder.path() / "none.png";
+    EXPECT_EQ(tests::errorOf([&] { readStored(none); }), none.string() + ": there is no such file: check the name");
+    EXPECT_EQ(tests::errorOf([&] { readStored(folder.path()); }),
+              folder.path().string() + ": is a folder, not a file: name a file in it");
     for (const std::string& bytes : {std::string("hello"), std::string(), whole.substr(0, 20), whole.substr(0, 60)}) {
         base::writeWhole(file, bytes);
         EXPECT_NE(tests::errorOf([&] { readStored(file); }).find("no ultrasound image"), std::string::npos);
