@@ -204,7 +204,7 @@ struct Record::Impl {
         return seed;
     }
 
-    void each(const std::function<void(const TickRecord&)>& visit)
+    void each(const std::function<bool(const TickRecord&)>& visit)
     {
         std::optional<Snapshot> snapshot;
         std::optional<Statement> ticks;
@@ -238,10 +238,9 @@ struct Record::Impl {
                 base::failIf(record.fired && !core, "tick {}: its core is missing, and it fired", record.tick);
                 format::checkTick(record, info);
             });
-            if (!more) {
+            if (!more || !visit(record)) {
                 return;
             }
-            visit(record);
         }
     }
 
@@ -324,6 +323,14 @@ std::uint64_t Record::ticks() const
 }
 
 void Record::each(const std::function<void(const TickRecord&)>& visit) const
+{
+    impl_->each([&](const TickRecord& record) {
+        visit(record);
+        return true;
+    });
+}
+
+void Record::eachWhile(const std::function<bool(const TickRecord&)>& visit) const
 {
     impl_->each(visit);
 }

@@ -96,6 +96,8 @@ public:
     std::uint64_t ticks() const;
     /// Calls `visit` for every tick in order, with events and cores filled in.
     void each(const std::function<void(const TickRecord&)>& visit) const;
+    /// As each(), for as long as `visit` says so; what comes behind is not read.
+    void eachWhile(const std::function<bool(const TickRecord&)>& visit) const;
     std::vector<std::pair<std::string, std::string>> results() const;
     /// Of one key; empty where there is none.
     std::string result(std::string_view key) const;

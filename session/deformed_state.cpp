@@ -60,10 +60,7 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
 {
     std::uint64_t next = 0;
     haptics::TickComparison comparison(record);
-    record.each([&](const haptics::TickRecord& then) {
-        if (next > tick) {
-            return;
-        }
+    record.eachWhile([&](const haptics::TickRecord& then) {
         base::failIf(then.tick != next,
                      "{}: tick {} is missing in the record: what comes after it cannot be "
                      "computed",
@@ -79,7 +76,7 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
         if (progress && next % 256 == 0) {
             progress(static_cast<double>(next) / static_cast<double>(tick + 1));
         }
-        ++next;
+        return next++ < tick;
     });
 }
 

@@ -172,6 +172,10 @@ TEST_F(RecordEdits, AStateOfAnEditedRecordIsNotExported)
     EXPECT_NE(exported.err.find("differs from tick 500 on"), std::string::npos) << exported.err;
     EXPECT_NE(exported.err.find("total_y_n"), std::string::npos) << exported.err;
     EXPECT_FALSE(std::filesystem::exists(out));
+    // What comes behind a state is not read for it.
+    const std::string damaged = edited("UPDATE ticks SET tip_x_m = NULL WHERE tick = 500");
+    EXPECT_EQ(palpate({"export", "--record", damaged, "--at", "1s", "-o", out}).status, 1);
+    EXPECT_EQ(palpate({"export", "--record", damaged, "--at", "0.4s", "-o", out}).status, 0);
 }
 
 // No room for a byte (RLIMIT_FSIZE; the signal that comes with it is ignored, as on a disk that is full).
