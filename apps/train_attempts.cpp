@@ -5,23 +5,54 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <set>
+#include <system_error>
 
 namespace palpate::apps {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// The ultrasound pictures that are stored beside a record.
+std::set<fs::path> picturesOf(const fs::path& record)
+{
+    std::set<fs::path> pictures;
+    std::error_code none;  // no folder, no pictures
+    for (const auto& one : fs::directory_iterator(fs::path(record).replace_extension(".ultrasound"), none)) {
+        if (one.path().extension() == ".png") {
+            pictures.insert(one.path());
+        }
+    }
+    return pictures;
+}
+
+// @param before  pictures that were there when it began
+void forget(const fs::path& record, const std::set<fs::path>& before)
+{
+    for (const char* part : {"", "-wal", "-shm", "-journal"}) {
+        fs::remove(record.string() + part);
+    }
+    for (const fs::path& picture : picturesOf(record)) {
+        if (!before.contains(picture)) {
+            fs::remove(picture);
+        }
+    }
+}
+
+}  // namespace
+
 session::TrainResult runToItsEnd(const haptics::SessionModel& model, haptics::SessionInfo& info,
                                  const session::TrainOptions& options)
 {
+    const auto before = options.record.empty() ? std::set<fs::path>() : picturesOf(options.record);
     for (;;) {
         session::TrainResult result = session::Trainer(model, info, options).run();
         if (!result.restart || result.signal != 0 || !result.problem.empty()) {
             return result;
         }
         if (!options.record.empty()) {
-            for (const char* part : {"", "-wal", "-shm", "-journal"}) {
-                fs::remove(options.record.string() + part);
-            }
+            forget(options.record, before);
         }
         fmt::print(stderr, "palpate: the session starts again\n");
         info.started = base::utc();

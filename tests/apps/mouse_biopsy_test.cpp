@@ -204,6 +204,12 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Folder folder;
+    const std::filesystem::path pictures = folder / "s.ultrasound";
+    std::filesystem::create_directory(pictures);
+    writeText(pictures / "earlier.png", "of another session");
+    const auto stored = [&] {
+        return std::distance(std::filesystem::directory_iterator(pictures), std::filesystem::directory_iterator());
+    };
     const std::string session = "paused-" + std::to_string(::getpid());
     const Desktop desktop;
     const auto train =
@@ -241,11 +247,15 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     EXPECT_EQ(eyes->state()->tick, at);
     EXPECT_EQ(glm::length(vec(eyes->state()->total)), 0.0);
     ASSERT_TRUE(pressUntil("s", [&] { return eyes->state()->tick > at; }));
+    desktop.xdotool({"key", "u"});  // the ultrasound picture
+    ASSERT_TRUE(pressUntil("p", [&] { return stored() > 1; }));
     ASSERT_TRUE(pressUntil("s", paused));
     ASSERT_TRUE(pressUntil("BackSpace", [&] { return eyes->ending() != channel::Ending::none; }));
     eyes = sessionWithHand(session);
     ASSERT_TRUE(eyes);
     EXPECT_FALSE(paused());
+    EXPECT_EQ(stored(), 1) << "pictures of the first attempt are gone, and no others";
+    EXPECT_TRUE(std::filesystem::exists(pictures / "earlier.png"));
     wait(2);
     ASSERT_TRUE(pressUntil("s", paused));
     const auto again = eyes->state()->tick;
