@@ -1,6 +1,7 @@
 #include <apps/parsed_program.h>
 #include <base/child_process.h>
 #include <base/error.h>
+#include <base/quantities.h>
 #include <command/json.h>
 #include <trainer/window.h>
 
@@ -10,6 +11,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 namespace {
 
@@ -71,13 +73,11 @@ void addOptions(CLI::App& app, Words& w)
 
 void run(Words& w)
 {
-    int end = 0;
-    int& width = w.options.width;
-    int& height = w.options.height;
-    const int read = std::sscanf(w.size.c_str(), "%dx%d%n", &width, &height, &end);
-    palpate::base::failIf(read != 2 || static_cast<std::size_t>(end) != w.size.size() || width < 320 || height < 240 ||
-                              width > 8192 || height > 8192,
+    const auto [width, height] = palpate::base::pixelsOf(w.size).value_or(std::pair(0, 0));
+    palpate::base::failIf(width < 320 || height < 240 || width > 8192 || height > 8192,
                           "--size {}: must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels", w.size);
+    w.options.width = width;
+    w.options.height = height;
     w.options.programs = palpate::base::programFolder();
     palpate::trainer::SessionFolder sink(w.sessions);
     const WindowFigures figures =

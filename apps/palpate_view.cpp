@@ -20,16 +20,16 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace {
 
 void readSize(const std::string& text, palpate::render::ViewerOptions& options)
 {
-    int end = 0;
-    const int read = std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &end);
-    palpate::base::failIf(read != 2 || static_cast<std::size_t>(end) != text.size(),
-                          "--size {}: must be WIDTHxHEIGHT in pixels, for example 1280x960", text);
+    const auto size = palpate::base::pixelsOf(text);
+    palpate::base::failIf(!size, "--size {}: must be WIDTHxHEIGHT in pixels, for example 1280x960", text);
+    std::tie(options.width, options.height) = *size;
 }
 
 void writeFigures(const std::string& file, const palpate::render::ViewerFigures& figures)

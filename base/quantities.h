@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace palpate::base {
 
@@ -11,6 +12,9 @@ std::optional<double> timeOf(std::string_view text);
 
 /// "100mm", "10cm" or "0.1m" in metres; nothing for anything else.
 std::optional<double> lengthOf(std::string_view text);
+
+/// "1280x960" as width and height; nothing for anything else.
+std::optional<std::pair<int, int>> pixelsOf(std::string_view text);
 
 /// "3%" or "0.03" as a share, over 0 and under 1. Throws std::runtime_error that names the option.
 double parseShare(const std::string& option, const std::string& text);

@@ -3,6 +3,7 @@
 #include <base/counted.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/round_step.h>
 #include <base/utf8.h>
 #include <report/html.h>
 #include <report/measure_table.h>
@@ -91,7 +92,7 @@ bool constant(const std::vector<ScoredGroup>& groups, const haptics::Measure& me
     return same && (all.size() == sessions || all.empty() || std::isinf(all.front()));
 }
 
-// 1, 2 or 5 times a power of ten, so that a range has two to five steps.
+// 1, 2 or 5 times a power of ten, so that a range has four to ten steps.
 double stepOf(double span)
 {
     const double ten = std::pow(10, std::floor(std::log10(span)));
@@ -106,7 +107,7 @@ std::string axisBelow(const Range& range, double finest, double y, const auto& x
     const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
     std::string out = fmt::format("<line x1=\"{:.0f}\" y1=\"{:.1f}\" x2=\"{:.0f}\" y2=\"{:.1f}\" class=\"axis\"/>",
                                   nameWidth, y, plotWidth - right, y);
-    for (double at = std::ceil(range.low / step - 1e-9) * step; at <= range.high + 1e-9 * step; at += step) {
+    for (const double at : base::multiplesIn(range.low, range.high, step)) {
         out += fmt::format(
             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" class=\"axis\"/><text x=\"{0:.1f}\" "
             "y=\"{3:.1f}\" text-anchor=\"middle\">{4:.{5}f}</text>",

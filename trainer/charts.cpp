@@ -1,5 +1,6 @@
 #include <trainer/charts.h>
 
+#include <base/round_step.h>
 #include <base/said.h>
 #include <trainer/widgets.h>
 
@@ -159,15 +160,7 @@ std::vector<double> ticksOf(double low, double high, int most)
     if (!(high > low) || most < 1) {
         return {low};
     }
-    const double rough = (high - low) / most, power = std::pow(10.0, std::floor(std::log10(rough)));
-    constexpr std::array steps{1.0, 2.0, 5.0, 10.0};
-    const auto wide = [&](double times) { return times == steps.back() || times * power >= rough; };
-    const double step = power * *std::ranges::find_if(steps, wide);
-    std::vector<double> ticks;
-    for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n) {
-        ticks.push_back(n * step);
-    }
-    return ticks;
+    return base::multiplesIn(low, high, base::roundStep((high - low) / most, true));
 }
 
 void drawCurves(const std::vector<ChartLine>& lines, float wide, float high)

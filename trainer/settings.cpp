@@ -1,12 +1,12 @@
 #include <trainer/settings.h>
 
+#include <base/outputs.h>
 #include <base/words.h>
 #include <trainer/lists.h>
 
 #include <nlohmann/json.hpp>
 
-#include <fstream>
-#include <system_error>
+#include <exception>
 
 namespace palpate::trainer {
 
@@ -46,16 +46,13 @@ std::string writeSettings(const fs::path& file, const Settings& settings)
     if (file.empty()) {
         return std::string("trainer.json") + base::tr(": the settings cannot be kept");
     }
-    std::error_code failed;
-    fs::create_directories(file.parent_path(), failed);
-    const fs::path fresh = file.string() + ".new";
-    std::ofstream out(fresh);
-    out << json.dump(2) << '\n';
-    out.close();
-    if (out) {
-        fs::rename(fresh, file, failed);
+    try {
+        base::makeFolders(file.parent_path());
+        base::writeWhole(file, json.dump(2) + '\n');
+        return "";
+    } catch (const std::exception&) {
+        return file.string() + base::tr(": the settings cannot be kept");
     }
-    return out && !failed ? "" : file.string() + base::tr(": the settings cannot be kept");
 }
 
 }  // namespace palpate::trainer

@@ -1,6 +1,7 @@
 #include <report/chart/axis.h>
 
 #include <base/error.h>
+#include <base/round_step.h>
 
 #include <fmt/format.h>
 
@@ -21,26 +22,12 @@ constexpr double noTick = std::numeric_limits<double>::quiet_NaN();
 constexpr double linearRoom = 0.05;  // of what the values span
 constexpr double logRoom = 1.12;     // a factor
 
-// The next of 1, 2, 5 times a power of ten, from `value` > 0 downwards or upwards.
-double roundStep(double value, bool up)
-{
-    const double decade = std::pow(10, std::floor(std::log10(value)));
-    double below = decade;
-    for (const double step : {1.0, 2.0, 5.0, 10.0}) {
-        if (up && step * decade >= value) {
-            return step * decade;
-        }
-        below = step * decade <= value ? step * decade : below;
-    }
-    return up ? 10 * decade : below;
-}
-
 AxisRange rangeOf(const std::vector<double>& values, bool log)
 {
     const auto [least, largest] = std::ranges::minmax(values);
     if (log) {
         // At the ends of the doubles a step further is none: zero or infinity.
-        const double low = roundStep(least / logRoom, false), high = roundStep(largest * logRoom, true);
+        const double low = base::roundStep(least / logRoom, false), high = base::roundStep(largest * logRoom, true);
         return {low > 0 ? low : least, std::isfinite(high) ? high : largest};
     }
     const double span = largest - least;

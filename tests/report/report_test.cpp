@@ -289,6 +289,14 @@ TEST(Report, QuartilesWithoutANumberAreOneDash)
 }
 
 // On a narrow screen a table in a box of its own is scrolled: its words stay whole.
+// Steps of 2 do not move a double of 1e17, whose neighbour is 16 away.
+TEST(Report, GroupsOfHugeValuesHaveAnAxis)
+{
+    std::vector<double> low(haptics::measures().size(), 1e17), high(low.size(), 1e17 + 16);
+    const std::string part = groupsPart({{"a", {low, low}}, {"b", {high, high}}});
+    EXPECT_NE(part.find(">100000000000000000</text>"), std::string::npos);
+}
+
 TEST(Report, WordsOfTablesThatScrollAreNotBroken)
 {
     const synthetic::Folder folder;

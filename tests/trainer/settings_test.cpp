@@ -28,6 +28,11 @@ TEST(Settings, AreThereAgain)
     EXPECT_TRUE(s.sounds);
     EXPECT_EQ(s.textScale, 1.5);
     EXPECT_EQ(s.person, "Ada");
+    const auto link = folder.path() / "link.json";
+    std::filesystem::create_symlink(file, link);
+    EXPECT_EQ(writeSettings(link, {"fr", "standard", false, 1, ""}), "");
+    EXPECT_TRUE(std::filesystem::is_symlink(link)) << "of somebody who keeps his settings elsewhere";
+    EXPECT_EQ(readSettings(file).language, "fr");
     EXPECT_NE(writeSettings("/proc/none/trainer.json", s), "") << "cannot be written, and says so";
     EXPECT_NE(writeSettings({}, s), "") << "a user without a home";
     EXPECT_FALSE(std::filesystem::exists(".new"));
