@@ -67,9 +67,8 @@ public:
             }
         });
         coarse.cutRows = rowsOf(coarse.cuts, coarse.nodes.size, &CutCell::cell);
-        volume::forEachIndex(Index3(0), coarse.nodes.size - 1, [&](Index3 n) {
-            coarse.fixed[coarse.nodes.offset(n)] = isFixed(2 * n) ? 1 : 0;
-        });
+        volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
+                             [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = isFixed(2 * n) ? 1 : 0; });
         fixFragments(coarse);
         return coarse;
     }
@@ -266,8 +265,8 @@ void holdVirtual(CellLevel& level)
     }
 }
 
-// Takes the stiffness from cells whose tissue is held: it is strained in none of them. A cell of bone that ends in front of a
-// node would hold that node, though the tissue beside the bone is free there.
+// Takes the stiffness from cells whose tissue is held: it is strained in none of them. A cell of bone that ends in front of
+// a node would hold that node, though the tissue beside the bone is free there.
 void yieldWhereHeld(const std::vector<float>& held, CellLevel& level)
 {
     for (std::size_t i = 0; i < held.size(); ++i) {

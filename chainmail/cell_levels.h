@@ -21,10 +21,11 @@ struct MixedCell {
 
 /// The finest level, and what coarser ones need to know of its cells.
 struct FinestLevel {
-    CellLevel level;               // without layers, `diagonal` and `radius`
-    std::vector<float> held;       // fraction of each cell's tissue that is held in space (count x 1)
-    /// Not 0 for nodes around which half of the tissue is held (count x 1). `level.fixed` holds more: all nodes of a cell whose
-    /// tissue is held, also those that it does not reach, where it is bone beside air. Coarser levels do not inherit these.
+    CellLevel level;          // without layers, `diagonal` and `radius`
+    std::vector<float> held;  // fraction of each cell's tissue that is held in space (count x 1)
+    /// Not 0 for nodes around which half of the tissue is held (count x 1). `level.fixed` holds more: all nodes of a cell
+    /// whose tissue is held, also those that it does not reach, where it is bone beside air. Coarser levels do not inherit
+    /// these.
     std::vector<std::uint8_t> mostlyHeld;
     std::vector<MixedCell> mixed;  // by z, then y, then x
     /// Which eighths of each cell are mostly tissue, a bit for each, x fastest: gaps between these divide the finest level,

@@ -229,7 +229,9 @@ void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcep
         const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holds[source] > 0.0F;
         for (const Field field : fields) {
             coarse.set(field, target,
-                       isHeld ? Vec3(0.0) : own ? fine.value(field, source) : continued(fine, field, holds, 2 * n));
+                       isHeld ? Vec3(0.0)
+                       : own  ? fine.value(field, source)
+                              : continued(fine, field, holds, 2 * n));
         }
     });
     Followers followers(fine, coarse);

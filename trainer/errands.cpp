@@ -76,10 +76,7 @@ struct Errands::Impl {
     static void forgetExpert(State& state)
     {
         std::error_code none;
-        if (!state.ghost.empty()) {
-            fs::remove(state.ghost, none);
-        }
-        state.ghost.clear();
+        fs::remove(std::exchange(state.ghost, {}), none);
     }
     static std::string whyNot(const Running& command, const std::vector<std::string>& arguments)
     {
@@ -112,9 +109,7 @@ struct Errands::Impl {
             return;  // who was there stays
         }
         state.people = peopleOf(answer);
-        if (chosenPerson(state) == nullptr) {
-            state.person.clear();
-        }
+        state.person = chosenPerson(state) == nullptr ? "" : state.person;
     }
     // What there was stays where the command fails.
     void listCases(State& state)
@@ -238,8 +233,7 @@ struct Errands::Impl {
     // Looks at the sessions that run as long as somebody looks at them.
     bool lookAtLive(State& state)
     {
-        const bool wanted = state.screen == Screen::instructor && state.instructor.page == InstructorPage::live;
-        if (!wanted) {
+        if (state.screen != Screen::instructor || state.instructor.page != InstructorPage::live) {
             live.reset();
             state.instructor.live.clear();
             return false;

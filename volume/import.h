@@ -23,7 +23,7 @@ struct ImportOptions {
     bool sheared = false;
     int volume = 0;    // which of the volumes of a file with four dimensions, from 1; 0: refuse such a file
     std::string axes;  // where the voxel axes of a file go that does not say it: "LPS", "RAS", ...; "": LPS, with a warning
-    bool axesIfUnsaid = false;  // a file that says it is not refused for `axes`; it keeps its own
+    bool axesIfUnsaid = false;                  // a file that says it is not refused for `axes`; it keeps its own
     bool renumber = false;                      // values that are no label (negative, over 65535) get free ones
     bool round = false;                         // values within 0.001 of a whole number are taken as that
     bool dicomLabels = false;                   // the values of a DICOM series of CT, MR and the like are labels

@@ -117,8 +117,9 @@ TEST_F(ImportOptions, ARenumberedValueTakesNoNameOfAnother)
     EXPECT_EQ(taken(file, {"--renumber", "--map", map, "--set", "70000=bone"}).at("labels").size(), 2U);
     const std::string bare = write("bare.mha", metaImage<std::int32_t>("MET_INT", {70000})),
                       names = write("names.ctbl", "1 fat 1 2 3 255\n70000 liver 1 2 3 255\n");
-    EXPECT_EQ(taken(bare, {"--renumber", "--names", names, "--map", "totalsegmentator", "--set", "1=fat"}).at("labels").size(),
-              2U);
+    EXPECT_EQ(
+        taken(bare, {"--renumber", "--names", names, "--map", "totalsegmentator", "--set", "1=fat"}).at("labels").size(),
+        2U);
 }
 
 TEST_F(ImportOptions, NearlyWholeValuesAreRoundedForWhoAsks)
@@ -163,8 +164,9 @@ TEST_F(ImportOptions, AnImageThatDoesNotSayItsAxesHasThoseOfTheLabels)
     const std::string centred = "Offset = -0.5 -2 -4.5\n",
                       labels = write("bare.mha", metaImage<std::uint8_t>("MET_UCHAR", {1, 2, 1, 2, 1, 2}, centred.c_str())),
                       image = write("ct.mha", metaImage<float>("MET_FLOAT", {1, 1000, 1, 1000, 1, 1000}, centred.c_str())),
-                      said = write("said.mha", metaImage<float>("MET_FLOAT", {1, 1000, 1, 1000, 1, 1000},
-                                                                 (centred + "TransformMatrix = 1 0 0 0 1 0 0 0 1\n").c_str()));
+                      said =
+                          write("said.mha", metaImage<float>("MET_FLOAT", {1, 1000, 1, 1000, 1, 1000},
+                                                             (centred + "TransformMatrix = 1 0 0 0 1 0 0 0 1\n").c_str()));
     const auto valueIn = [&](const Arguments& more) {
         EXPECT_EQ(palpate(import(labels, with(more))).status, 0);
         const volume::Tissue tissue = volume::Tissue::load(vdb);

@@ -292,8 +292,8 @@ TEST(ElasticBody, CoarseCellsUnderAFreeSurfaceAreLaminates)
     }
 }
 
-// A bar stands on a plate of bone that is wider than it and ends within the cells of every level. Bone is 1e5 times as stiff: a
-// node in front of it, where the bar is free, that were a corner of a cell of bone would be held.
+// A bar stands on a plate of bone that is wider than it and ends within the cells of every level. Bone is 1e5 times as
+// stiff: a node in front of it, where the bar is free, that were a corner of a cell of bone would be held.
 TEST(ElasticBody, BoneHoldsNoNodeInFrontOfIt)
 {
     const auto material = [](Index3 c) {

@@ -39,7 +39,8 @@ double offAffine(WindowStack& stack, Field field, double off = 0.0)
 {
     double most = 0.0;
     tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3 rest) {
-        if (off == 0.0 || (glm::all(glm::greaterThan(rest, Vec3(off))) && glm::all(glm::lessThan(rest, Vec3(48e-3 - off))))) {
+        if (off == 0.0 ||
+            (glm::all(glm::greaterThan(rest, Vec3(off))) && glm::all(glm::lessThan(rest, Vec3(48e-3 - off))))) {
             most = std::max(most, glm::distance(tests::valueAt(w, node, field), affine(rest)));
         }
     });
@@ -254,8 +255,8 @@ TEST(ElasticWindows, FollowingKeepsTheDisplacement)
     EXPECT_LT(kept, size.x * size.y * size.z);
 }
 
-// Windows of `size` nodes jump about 40 times with an affine field in them; returns how far off it is at the worst node. What
-// is held at the body's border goes back to where it is held, at every level, and no node from there on is looked at.
+// Windows of `size` nodes jump about 40 times with an affine field in them; returns how far off it is at the worst node.
+// What is held at the body's border goes back to where it is held, at every level, and no node from there on is looked at.
 double offAfterJumps(int size)
 {
     std::minstd_rand random(4);
@@ -312,8 +313,8 @@ TEST(ElasticWindows, FollowingTakesNothingFromNodesWithoutTissue)
     EXPECT_LT(most, 1e-6 * spacing);
 }
 
-// Cells of 1, 2 and 4 mm hold other nodes: a fine node beside the base may be free and the coarse one at its place held, and
-// the other way round. With windows that come and go, neither takes the displacement of the other.
+// Cells of 1, 2 and 4 mm hold other nodes: a fine node beside the base may be free and the coarse one at its place held,
+// and the other way round. With windows that come and go, neither takes the displacement of the other.
 TEST(ElasticWindows, WhatIsHeldStaysWhereItIs)
 {
     std::minstd_rand random(6);

@@ -144,8 +144,8 @@ Seen readMany(const std::string& session, std::uint64_t enough)
     return seen;
 }
 
-// Writes without a rest but for one of a millisecond after every 64th displaced copy: a reader that is slower than this writer,
-// as it may be under a sanitizer, gets one then.
+// Writes without a rest but for one of a millisecond after every 64th displaced copy: a reader that is slower than this
+// writer, as it may be under a sanitizer, gets one then.
 void hammer(Publisher& publisher, const std::atomic<bool>& stop)
 {
     for (std::uint64_t tick = 1; !stop.load(std::memory_order_relaxed); ++tick) {

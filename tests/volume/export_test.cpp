@@ -190,10 +190,11 @@ TEST(Export, NamesColoursAndTermsOfSegmentsAreKept)
     image.values[image.offset({2, 3, 4})] = 5;
     image.values[image.offset({7, 3, 5})] = 5;
     image.values[image.offset({8, 7, 6})] = 200;
-    const std::vector<LabelName> named{{5, "left \"lung\"", "lung", std::array<std::uint8_t, 3>{12, 255, 0},
-                                        "c~SCT^123037004^Anatomical Structure~SCT^39607008^Lung~SCT^7771000^Left~a~^^~^^"},
-                                       {9, "now\\here", "fat"},
-                                       {200, "M\xc3\xbcller's \\duct\\n", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
+    const std::vector<LabelName> named{
+        {5, "left \"lung\"", "lung", std::array<std::uint8_t, 3>{12, 255, 0},
+         "c~SCT^123037004^Anatomical Structure~SCT^39607008^Lung~SCT^7771000^Left~a~^^~^^"},
+        {9, "now\\here", "fat"},
+        {200, "M\xc3\xbcller's \\duct\\n", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
     for (const std::string ending : {".seg.nrrd", ".nii.gz"}) {
         SCOPED_TRACE(ending);
         const std::string file = folder / ("s" + ending);

@@ -166,8 +166,8 @@ void LabelSink::refuseOdd(bool surelyLabels) const
            outside_->voxel, outside_->value);
 }
 
-// The labels of codes: values from 0 to 65535 stay, others take the lowest that are free, in rising order. One that the file
-// names is not free, though no voxel has it.
+// The labels of codes: values from 0 to 65535 stay, others take the lowest that are free, in rising order. One that the
+// file names is not free, though no voxel has it.
 std::vector<std::uint16_t> LabelSink::decoded(ImportedLabels& out) const
 {
     std::vector<std::uint16_t> labelOf(values_.size());

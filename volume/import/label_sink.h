@@ -31,8 +31,9 @@ public:
     LabelSink(std::filesystem::path file, Index3 size, LabelRules rules);
 
     void add(std::span<const double> values);
-    /// Refuses images (too many different values) and empty maps. Sets the voxels of `out` and what was renumbered, to values
-    /// that `out` has no name for, and adds a warning for what was changed. `surelyLabels`: the file says itself that it is a label map.
+    /// Refuses images (too many different values) and empty maps. Sets the voxels of `out` and what was renumbered, to
+    /// values that `out` has no name for, and adds a warning for what was changed. `surelyLabels`: the file says itself
+    /// that it is a label map.
     void finish(bool surelyLabels, ImportedLabels& out);
 
     /// One value at once; what is no label is refused, renumbering or not.

@@ -68,7 +68,8 @@ Source readMgh(const std::filesystem::path& file)
                      (centre - linear * (0.5 * Vec3(source.size))) * flip};
     if (!placed) {
         source.warnings.emplace_back(
-            "its header gives no place: voxels of 1 mm are assumed, and FreeSurfer's coronal axes unless --axes says otherwise");
+            "its header gives no place: voxels of 1 mm are assumed, and FreeSurfer's coronal axes unless --axes says "
+            "otherwise");
         source.oriented = false;
         source.assumed = std::exchange(source.affine, {Mat3(1e-3), -0.5e-3 * Vec3(source.size)});
     }

@@ -116,8 +116,8 @@ Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_
 /// Picks options.volume of a source with four dimensions, or refuses it; the layers of a .seg.nrrd count as volumes then.
 void chooseVolume(Source& source, const ImportOptions& options);
 
-/// Where the voxel axes go that a header does not say: options.axes, else where the program of that format assumes them, else
-/// left, posterior, superior, with a warning. The one rule for all formats.
+/// Where the voxel axes go that a header does not say: options.axes, else where the program of that format assumes them,
+/// else left, posterior, superior, with a warning. The one rule for all formats.
 void placeAxes(Source& source, const ImportOptions& options);
 /// The same of axes that a file never says.
 void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::string>& warnings);

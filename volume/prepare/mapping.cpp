@@ -282,8 +282,8 @@ private:
                 byName.label.tissue = find(known_->labels, value)->tissue;
                 byName.certain = true;
             }
-            const bool said =
-                std::ranges::any_of(settings_, [&, v = labels_.originalOf(value)](const Setting& s) { return s.names(v, own->name); });
+            const bool said = std::ranges::any_of(
+                settings_, [&, v = labels_.originalOf(value)](const Setting& s) { return s.names(v, own->name); });
             if (!said && byName.certain && byName.label.tissue != mapped->tissue) {
                 list.push_back(fmt::format("{} is '{}' ({}) in the file and '{}' ({}) in the map", value, own->name,
                                            byName.label.tissue, mapped->name, mapped->tissue));
@@ -441,8 +441,8 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
     std::string further;
     for (const auto& [value, voxels] : counts) {
         if (const std::int64_t original = labels.originalOf(value); original != value) {
-            further += fmt::format("# A label map has values from 0 to 65535. For the label {} give --set {}=TISSUE.\n", original,
-                                   original);
+            further += fmt::format("# A label map has values from 0 to 65535. For the label {} give --set {}=TISSUE.\n",
+                                   original, original);
             continue;
         }
         FoundLabel found = mapper.tissueOf(value);
