@@ -145,7 +145,7 @@ std::array<float, 2 * gaussReach + 1> gaussian()
 struct SampleBox {
     Index3 low{0}, size{0};
 
-    std::size_t offset(Index3 n) const noexcept { return static_cast<std::size_t>((n.z * size.y + n.y) * size.x + n.x); }
+    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
 };
 
 // One axis of the blur. Beyond a flat side lies its mirror image; beyond the others, nothing.
