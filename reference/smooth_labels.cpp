@@ -1,5 +1,7 @@
 #include <reference/smooth_labels.h>
 
+#include <base/error.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
@@ -96,11 +98,15 @@ int layOnItsBack(const volume::Affine& affine, SoftVoxels& voxels)
     for (int a = 1; a < 3; ++a) {
         axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
     }
+    base::failIf(
+        voxels.size[axis] < 2,
+        "volume: it is one voxel thick from front to back and nothing holds it: its rear layer, which would be held, "
+        "is all there is; mark a tissue as fixed, or use smaller voxels");
     const bool backIsHigh = affine.linear[axis].y > 0.0;
     const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * voxels.size[axis])));
     Index3 first(0), last = voxels.size - 1;
     (backIsHigh ? last : first)[axis] += backIsHigh ? -layers : layers;
-    voxels = cropped(voxels, first, glm::max(first, last));
+    voxels = cropped(voxels, first, last);
     return 2 * axis + (backIsHigh ? 1 : 0);
 }
 

@@ -57,7 +57,7 @@ enum class Keep : std::uint8_t { soft, all };
 /// Soft is what is neither air, nor bone, nor fixed. A body of which nothing is fixed lies on its back, as in
 /// volume::Tissue::support(): its rear 5 %, in whole layers of voxels and at least one, are left out, and it is held there.
 /// With Keep::all everything but air is a region, and nothing is left out.
-/// Throws std::runtime_error where there is no such tissue.
+/// Throws std::runtime_error where there is no such tissue, or where a body that nothing holds has one layer only.
 SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep = Keep::soft);
 
 /// Chooses the biases so that the regions have these volumes [m^3] (rows x 1).

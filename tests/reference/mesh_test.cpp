@@ -2,6 +2,7 @@
 #include <datasets/tables.h>
 #include <reference/mesh_parts.h>
 #include <reference/mesher.h>
+#include <tests/error_of.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -335,6 +336,22 @@ TEST(Mesher, LaysABodyThatNothingHoldsOnItsBack)
         }
     }
     EXPECT_NEAR(held, 20e-3 * 20e-3, 1e-6);
+}
+
+// Its rear layer is held: with one layer only there would be nothing left that moves.
+TEST(SmoothLabels, RefuseABodyOfOneLayerThatNothingHolds)
+{
+    for (const double towardsTheBack : {1.0, -1.0}) {
+        volume::LabelImage image;
+        image.size = {8, 1, 6};
+        image.affine.linear = Mat3(Vec3(1e-3, 0, 0), Vec3(0, towardsTheBack * 1e-3, 0), Vec3(0, 0, 1e-3));
+        image.values.assign(48, 1);
+        const std::vector<volume::LabelName> names{{1, "fat", "fat"}};
+        const auto tissue = volume::Tissue::fromLabels(image, datasets::defaultTissues(), names, {});
+        const auto error = tests::errorOf([&] { smoothLabels(tissue); });
+        EXPECT_NE(error.find("one voxel thick from front to back"), std::string::npos) << error;
+        EXPECT_NO_THROW(smoothLabels(tissue, Keep::all));
+    }
 }
 
 TEST(Mesher, SaysWhatIsMissingWhereThereIsNothingToMesh)
