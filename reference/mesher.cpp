@@ -18,9 +18,10 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double whole = 0.98;     // share from which on a tetrahedron is one tissue
-constexpr double rounding = 0.05;  // of the logarithm of Young's modulus
-constexpr int samples = 64;        // points at which a tetrahedron is looked into
+constexpr double whole = 0.98;              // share from which on a tetrahedron is one tissue
+constexpr double rounding = 0.05;           // of the logarithm of Young's modulus
+constexpr int samples = 64;                 // points at which a tetrahedron is looked into
+constexpr std::size_t mostMaterials = 256;  // that TetMesh::tissue can number
 
 // Points spread evenly over a tetrahedron, in barycentric coordinates: an additive sequence in the unit cube, sorted.
 // Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
@@ -121,6 +122,12 @@ Mixtures mixTissues(const SmoothLabels& labels, const volume::TissueTable& table
         bucket.sum.poisson += volume * m.poisson;
         bucket.sum.stiffening += volume * m.stiffening;
     }
+    const std::size_t materials = table.rows.size() + buckets.size();
+    base::failIf(
+        materials > mostMaterials,
+        "volume: {} rows of the tissue table and {} mixtures of thin tissues are more than {} materials: leave out "
+        "rows that the volume does not need",
+        table.rows.size(), buckets.size(), mostMaterials);
     Mixtures out;
     for (const auto& [step, bucket] : buckets) {
         for (const std::size_t t : bucket.tets) {

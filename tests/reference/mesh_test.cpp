@@ -308,6 +308,26 @@ TEST(Mesher, MixesThinTissuesFarAwayWhenThereAreTooMany)
     }
 }
 
+// Mixtures are numbered on from the table's rows, in a byte: a full table leaves no number for them.
+TEST(Mesher, RefusesMoreMaterialsThanItCanNumber)
+{
+    volume::TissueTable table = datasets::defaultTissues();
+    while (table.rows.size() < 256) {
+        table.rows.push_back(table.rows.back());
+        table.rows.back().name = "spare" + std::to_string(table.rows.size());
+    }
+    datasets::PhantomSpec spec;
+    spec.name = "layered";
+    spec.numbers = {{"width_mm", 30}, {"skin_mm", 2}, {"fat_mm", 6}, {"gland_mm", 8}, {"bone_mm", 3}, {"tumours", 0}};
+    MeshOptions options = coarse();
+    options.radius = 1e-3;
+    options.from = options.to = Vec3(-15e-3, 0, -15e-3);
+    options.most = 1;
+    const auto error = tests::errorOf([&] { meshBody(datasets::makePhantom(spec, table), options); });
+    EXPECT_NE(error.find("256 rows of the tissue table and "), std::string::npos) << error;
+    EXPECT_NE(error.find("more than 256 materials"), std::string::npos) << error;
+}
+
 TEST(Mesher, GivesTheSameBitsAgain)
 {
     MeshOptions options = coarse();
