@@ -148,6 +148,20 @@ std::string setName(const std::string& name)
     return out;
 }
 
+// Of each row of the table. Names that would be alike have their row at the end, but for the first.
+std::vector<std::string> setNames(const volume::TissueTable& table)
+{
+    std::vector<std::string> names;
+    for (const auto& row : table.rows) {
+        std::string name = setName(row.name);
+        while (std::ranges::find(names, name) != names.end()) {
+            name += fmt::format("_{}", names.size());
+        }
+        names.push_back(name);
+    }
+    return names;
+}
+
 void addNodeSet(const std::string& name, const std::set<std::uint32_t>& nodes, std::string& text)
 {
     text += "*NSET, NSET=" + name + "\n";
@@ -158,7 +172,7 @@ void addNodeSet(const std::string& name, const std::set<std::uint32_t>& nodes, s
     text += at % perLine == 0 ? "" : "\n";
 }
 
-void addNodeSets(const TetMesh& mesh, const volume::TissueTable& table, std::string& text)
+void addNodeSets(const TetMesh& mesh, const std::vector<std::string>& names, std::string& text)
 {
     std::set<std::uint32_t> outside;
     for (const auto& f : surfacesOf(mesh, AllPoints::yes).facets) {
@@ -172,7 +186,7 @@ void addNodeSets(const TetMesh& mesh, const volume::TissueTable& table, std::str
         nodes[mesh.tissue[t]].insert(mesh.tets[t].begin(), mesh.tets[t].end());
     }
     for (const auto& [row, set] : nodes) {
-        addNodeSet("N" + setName(table.rows[row].name).substr(1), set, text);
+        addNodeSet("N" + names[row].substr(1), set, text);
     }
 }
 
@@ -187,8 +201,9 @@ std::string inpText(const TetMesh& mesh, const volume::TissueTable& table)
         const Vec3 at = units::mm * mesh.points[p];
         fmt::format_to(out, "{},{:.12g},{:.12g},{:.12g}\n", p + 1, at.x, at.y, at.z);
     }
+    const std::vector<std::string> names = setNames(table);
     for (const std::uint8_t row : tissuesOf(mesh)) {
-        fmt::format_to(out, "*ELEMENT, TYPE=C3D4, ELSET={}\n", setName(table.rows[row].name));
+        fmt::format_to(out, "*ELEMENT, TYPE=C3D4, ELSET={}\n", names[row]);
         for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
             const auto& n = mesh.tets[t];
             if (mesh.tissue[t] == row) {
@@ -198,11 +213,10 @@ std::string inpText(const TetMesh& mesh, const volume::TissueTable& table)
     }
     for (const std::uint8_t row : tissuesOf(mesh)) {
         const auto& tissue = table.rows[row];
-        const std::string name = setName(tissue.name);
         fmt::format_to(out, "*MATERIAL, NAME={0}\n*ELASTIC\n{1:.12g},{2:.12g}\n*SOLID SECTION, ELSET={0}, MATERIAL={0}\n",
-                       name, units::kPa * tissue.youngsModulus, tissue.poissonRatio);
+                       names[row], units::kPa * tissue.youngsModulus, tissue.poissonRatio);
     }
-    addNodeSets(mesh, table, text);
+    addNodeSets(mesh, names, text);
     return text;
 }
 

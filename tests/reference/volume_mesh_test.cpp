@@ -413,6 +413,21 @@ TEST_F(MeshFiles, CalculixSolvesARigidMotion)
     }
 }
 
+// CalculiX knows no hyphen: the second of two tissues that differ in one only has its row in the name.
+TEST_F(MeshFiles, TissuesOfOneNameInCalculixStayApart)
+{
+    table_.rows[1].name = "gland-1";
+    table_.rows[2].name = "gland_1";
+    const auto file = folder_.path() / "m.inp";
+    const std::string text = meshText(mesh_, table_, file);
+    for (const char* line : {"ELSET=T_GLAND_1\n", "ELSET=T_GLAND_1_2\n", "NAME=T_GLAND_1\n", "NAME=T_GLAND_1_2\n",
+                             "ELSET=T_GLAND_1_2, MATERIAL=T_GLAND_1_2\n", "NSET=N_GLAND_1\n", "NSET=N_GLAND_1_2\n"}) {
+        const auto first = text.find(line);
+        ASSERT_NE(first, std::string::npos) << line;
+        EXPECT_EQ(text.find(line, first + 1), std::string::npos) << line;
+    }
+}
+
 TEST_F(MeshFiles, UnknownEndingIsRefused)
 {
     EXPECT_THROW(checkMeshFile("mesh.stl"), std::runtime_error);
