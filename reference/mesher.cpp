@@ -169,10 +169,12 @@ std::vector<double> volumesIn(const SmoothLabels& labels)
 {
     const double fraction = labels.affine.voxelVolume() / 8.0;
     std::vector<double> volume(labels.rows.size(), 0.0);
-    volume::forEachIndex(Index3(0), 2 * labels.size - 1, [&](Index3 n) {
-        const Vec3 index = Vec3(labels.low) + 0.5 * Vec3(n) - 0.25;
-        if (const int region = regionAt(labels, labels.affine.toPatient(index)); region >= 0) {
-            volume[static_cast<std::size_t>(region)] += fraction;
+    volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
+        for (int i = 0; i < 8; ++i) {
+            const Vec3 index = Vec3(n + labels.low) + countedAt(n, i);
+            if (const int region = regionAt(labels, labels.affine.toPatient(index)); region >= 0) {
+                volume[static_cast<std::size_t>(region)] += fraction;
+            }
         }
     });
     return volume;
@@ -217,14 +219,14 @@ private:
         return meshRegions(labels_, seeds, options_, bounds_, maxPoints);
     }
 
-    // Chords make regions that bulge too small: asks for as much more, and meshes again. Not for those that are left out
-    // somewhere.
-    TetMesh corrected(TetMesh mesh)
+    // Chords make regions that bulge too small: asks for as much more, and meshes again; the best mesh counts. Not for
+    // those that are left out somewhere.
+    TetMesh corrected(TetMesh best)
     {
         const std::vector<double> target = volumesIn(labels_);
-        std::vector<double> wanted = labels_.volume;
+        std::vector<double> wanted = labels_.volume, volume = volumesOf(best, labels_.rows);
+        double least = squaredErrors(volume, target);
         for (int pass = 0; pass < options_.volumePasses; ++pass) {
-            const auto volume = volumesOf(mesh, labels_.rows);
             bool off = false;
             for (std::size_t r = 0; r < wanted.size(); ++r) {
                 if (std::isinf(labels_.within[r]) && volume[r] > 0.0 &&
@@ -237,9 +239,25 @@ private:
                 break;
             }
             fitVolumes(labels_, wanted);
-            mesh = *once(0);
+            TetMesh next = *once(0);
+            volume = volumesOf(next, labels_.rows);
+            if (const double error = squaredErrors(volume, target); error < least) {
+                least = error;
+                best = std::move(next);
+            }
         }
-        return mesh;
+        return best;
+    }
+
+    // Of the regions that are left out nowhere.
+    double squaredErrors(const std::vector<double>& volume, const std::vector<double>& target) const
+    {
+        double sum = 0.0;
+        for (std::size_t r = 0; r < volume.size(); ++r) {
+            const double error = target[r] > 0.0 ? volume[r] / target[r] - 1.0 : 0.0;
+            sum += std::isinf(labels_.within[r]) ? error * error : 0.0;
+        }
+        return sum;
     }
 
     SmoothLabels& labels_;

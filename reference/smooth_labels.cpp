@@ -350,8 +350,7 @@ BorderPoints borderPoints(const SmoothLabels& labels)
         }
         for (int i = 0; i < 8; ++i) {
             NearVoxels c;
-            const Vec3 part((i & 1) != 0 ? 0.25 : -0.25, (i & 2) != 0 ? 0.25 : -0.25, (i & 4) != 0 ? 0.25 : -0.25);
-            if (!cornersAt(labels, Vec3(n) + part, c)) {
+            if (!cornersAt(labels, Vec3(n) + countedAt(n, i), c)) {
                 continue;
             }
             sharesAt(labels, c, here);
@@ -365,7 +364,8 @@ BorderPoints borderPoints(const SmoothLabels& labels)
     return out;
 }
 
-// What to add to a bias so that `wanted` points have a margin above nothing; 0 when about as many have it already.
+// What to add to a bias so that `wanted` points have a margin above nothing, and nothing is half way to the next one; 0
+// when about as many have it already.
 double biasStep(std::vector<double>& margins, double wanted)
 {
     const auto now = static_cast<double>(std::ranges::count_if(margins, [](double m) { return m > 0.0; }));
@@ -375,7 +375,8 @@ double biasStep(std::vector<double>& margins, double wanted)
     const double last = std::clamp(wanted, 0.0, static_cast<double>(margins.size()) - 1.0);
     const auto at = margins.begin() + static_cast<std::ptrdiff_t>(last);
     std::nth_element(margins.begin(), at, margins.end(), std::greater<>());
-    return -*at;
+    const bool between = at != margins.begin() && wanted < static_cast<double>(margins.size());
+    return between ? -0.5 * (*std::min_element(margins.begin(), at) + *at) : -*at;
 }
 
 void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
@@ -419,6 +420,22 @@ void fitRow(SmoothLabels& labels, const BorderPoints& points, std::size_t row, d
 bool isHeld(const volume::TissueRow& row) noexcept
 {
     return row.fixed || row.role == volume::Role::bone;
+}
+
+// Source of the numbers: as in samplePoints() of the mesher.
+Vec3 countedAt(Index3 n, int eighth) noexcept
+{
+    constexpr std::array<double, 3> step{0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
+    constexpr double turn = 0.6180339887498949;  // from one eighth to the next
+    Vec3 at(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        double along = eighth * turn;
+        for (int other = 0; other < 3; ++other) {
+            along += step[static_cast<std::size_t>((axis + other) % 3)] * n[other];
+        }
+        at[axis] = 0.5 * (along - std::floor(along)) - ((eighth >> axis & 1) != 0 ? 0.0 : 0.5);
+    }
+    return at;
 }
 
 SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep)

@@ -63,6 +63,12 @@ SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep = Keep::soft);
 /// Chooses the biases so that the regions have these volumes [m^3] (rows x 1).
 void fitVolumes(SmoothLabels& labels, std::span<const double> wanted);
 
+/// Where a voxel is looked into to count volumes, from its centre [voxels]: one point in each eighth of it. From voxel to
+/// voxel they differ, so that those of a flat layer lie at all depths: else thin plates would get a volume in steps.
+/// @param n       sample of SmoothLabels
+/// @param eighth  bit a: in the upper half along axis a
+Vec3 countedAt(Index3 n, int eighth) noexcept;
+
 /// Which of SmoothLabels::rows a point [m] belongs to; -1 outside.
 int regionAt(const SmoothLabels& labels, Vec3 p) noexcept;
 /// Distance from a point to a line from one point to another [m].
