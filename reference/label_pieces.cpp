@@ -78,6 +78,9 @@ private:
 
 std::vector<double> thicknesses(const SmoothLabels& labels)
 {
+    const Vec3 spacing = labels.affine.spacing();
+    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
+    // Voxels, and faces to others: a face counts by its area, that of the largest one is 1.
     std::vector<double> count(labels.rows.size(), 0.0), border(labels.rows.size(), 0.0);
     const auto region = regionsOf(labels);
     volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
@@ -90,11 +93,10 @@ std::vector<double> thicknesses(const SmoothLabels& labels)
             Index3 next = n;
             next[side / 2] += side % 2 == 0 ? -1 : 1;
             const bool inside = next[side / 2] >= 0 && next[side / 2] < labels.size[side / 2];
-            border[static_cast<std::size_t>(here)] += !inside || region[labels.offset(next)] != here ? 1.0 : 0.0;
+            border[static_cast<std::size_t>(here)] +=
+                !inside || region[labels.offset(next)] != here ? voxel / spacing[side / 2] : 0.0;
         }
     });
-    const Vec3 spacing = labels.affine.spacing();
-    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
     for (std::size_t r = 0; r < count.size(); ++r) {
         count[r] = border[r] > 0.0 ? 2.0 * voxel * count[r] / border[r] : voxel;
     }

@@ -1,5 +1,6 @@
 // Thin plates of one tissue in another: what the smoothing of labels must not take from them.
 #include <datasets/tables.h>
+#include <reference/label_pieces.h>
 #include <reference/smooth_labels.h>
 #include <reference/volume_mesh.h>
 
@@ -91,6 +92,17 @@ TEST(Plates, OfOneToThreeVoxelsKeepTheirVolumeInMeshes)
             EXPECT_EQ(made.quality.flipped + made.quality.overShared, 0U);
         }
     }
+}
+
+// Of 40 x 40 voxels of 1 x 1 x 5 mm, one layer: V = 8000, two faces of 1600 and four of 200 mm^2, so 2 V / S = 4 mm. Three
+// layers below and above have V = 24000, two faces of 1600 and four of 600 mm^2 each: both pieces together 8.57 mm.
+TEST(Plates, OfLongVoxelsAreAsThickAsTheirVolumeAndSurfaceSay)
+{
+    const auto tissue = blockWith({40, 40, 7}, Vec3(1e-3, 1e-3, 5e-3), [](Index3 n) { return n.z == 3; });
+    const auto thick = thicknesses(smoothLabels(tissue, Keep::all));
+    ASSERT_EQ(thick.size(), 2U);
+    EXPECT_NEAR(thick[0], 2.0 * 24000.0 / 5600.0 * 1e-3, 1e-6);
+    EXPECT_NEAR(thick[1], 4e-3, 1e-6);
 }
 
 }  // namespace
