@@ -5,6 +5,7 @@
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <base/units.h>
+#include <reference/quadratic_mesh.h>
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
@@ -29,44 +30,6 @@ constexpr std::size_t stepsPerCentre = 2;
 // Sets of nodes that the patch drives along x, y, z.
 constexpr std::array<const char*, 3> drivenSets{"DRIVENX", "DRIVENY", "DRIVENZ"};
 
-// Corners of each edge of C3D10, in its order.
-constexpr std::array<std::array<std::size_t, 2>, 6> edges{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
-
-// Nodes by number: a corner's is its own, a middle's that of its edge.
-class CcxMesh {
-public:
-    explicit CcxMesh(const TetMesh& mesh) : nodes(mesh.points)
-    {
-        for (const auto& tet : mesh.tets) {
-            std::array<std::uint32_t, 10> ten{tet[0], tet[1], tet[2], tet[3]};
-            for (std::size_t e = 0; e < edges.size(); ++e) {
-                ten[4 + e] = middle(tet[edges[e][0]], tet[edges[e][1]]);
-            }
-            tets.push_back(ten);
-        }
-    }
-
-    std::uint32_t middle(std::uint32_t a, std::uint32_t b)
-    {
-        const auto [at, isNew] = middles_.emplace(std::minmax(a, b), static_cast<std::uint32_t>(nodes.size()));
-        if (isNew) {
-            nodes.push_back(0.5 * (nodes[a] + nodes[b]));
-        }
-        return at->second;
-    }
-    std::array<std::uint32_t, 6> face(const TetMesh::Face& f)
-    {
-        const auto& p = f.points;
-        return {p[0], p[1], p[2], middle(p[0], p[1]), middle(p[1], p[2]), middle(p[2], p[0])};
-    }
-
-    std::vector<Vec3> nodes;                          // [m]
-    std::vector<std::array<std::uint32_t, 10>> tets;  // in the order of C3D10
-
-private:
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles_;
-};
-
 // What each component of each node is set to.
 struct Fixed {
     std::map<std::pair<std::uint32_t, int>, double> value;  // node and component to displacement [m]
@@ -78,7 +41,7 @@ bool mirroredAt(const SolveOptions& options, int axis, Vec3 p)
     return options.mirrored[static_cast<std::size_t>(axis)] && std::abs(p[axis]) < onPlane;
 }
 
-Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& patch, CcxMesh& quadratic)
+Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& patch, QuadraticMesh& quadratic)
 {
     Fixed fixed;
     std::vector<char> inPatch(quadratic.nodes.size());
@@ -113,7 +76,7 @@ Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& 
     return fixed;
 }
 
-void writeElements(std::ostream& out, const TetMesh& mesh, const CcxMesh& quadratic)
+void writeElements(std::ostream& out, const TetMesh& mesh, const QuadraticMesh& quadratic)
 {
     out << "*NODE, NSET=NALL\n";
     for (std::size_t n = 0; n < quadratic.nodes.size(); ++n) {
@@ -330,13 +293,13 @@ void writeSteps(std::ostream& out, const CcxPress& press)
 }
 
 // Points that are held, and the middles of edges between two of them.
-std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const CcxMesh& quadratic)
+std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const QuadraticMesh& quadratic)
 {
     const std::set<std::uint32_t> points(held.begin(), held.end());
     std::set<std::uint32_t> nodes = points;
     for (const auto& tet : quadratic.tets) {
-        for (std::size_t e = 0; e < edges.size(); ++e) {
-            if (points.contains(tet[edges[e][0]]) && points.contains(tet[edges[e][1]])) {
+        for (std::size_t e = 0; e < QuadraticMesh::edges.size(); ++e) {
+            if (points.contains(tet[QuadraticMesh::edges[e][0]]) && points.contains(tet[QuadraticMesh::edges[e][1]])) {
                 nodes.insert(tet[4 + e]);
             }
         }
@@ -348,7 +311,7 @@ std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const Ccx
 
 std::vector<Vec3> quadraticNodes(const TetMesh& mesh)
 {
-    return CcxMesh(mesh).nodes;
+    return QuadraticMesh(mesh).nodes;
 }
 
 void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file)
@@ -363,7 +326,7 @@ void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law,
 std::string ccxText(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options,
                     const Patch& patch)
 {
-    CcxMesh quadratic(mesh);
+    QuadraticMesh quadratic(mesh);
     const Fixed fixed = fixedNodes(mesh, options, patch, quadratic);
     std::ostringstream out;
     writeElements(out, mesh, quadratic);
@@ -419,7 +382,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
 {
     constexpr double pressurePer = 50.0;  // mm of overclosure, in the softest modulus
     checkCcx(mesh, materials, NeoHookean{}, file);
-    const CcxMesh quadratic(mesh);
+    const QuadraticMesh quadratic(mesh);
     const ShellMesh shell(press.start, press.radius, glm::normalize(press.centres.front() - press.start),
                           quadratic.nodes.size());
     std::ofstream out(file);

@@ -2,6 +2,7 @@
 
 #include <base/error.h>
 #include <base/units.h>
+#include <reference/quadratic_mesh.h>
 #include <reference/surfaces.h>
 
 #include <fmt/format.h>
@@ -250,36 +251,8 @@ std::string meshText(const TetMesh& mesh, const volume::TissueTable& table, cons
 
 namespace {
 
-// Edges in the order of VTK's quadratic tetrahedron, whose points they follow.
-constexpr std::array<std::pair<std::size_t, std::size_t>, 6> edgeCorners{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 // VTK stores xx yy zz xy yz xz, the solver xx yy zz yz xz xy.
 constexpr std::array<std::size_t, 6> stressOrder{0, 1, 2, 5, 3, 4};
-
-struct QuadraticMesh {
-    std::vector<Vec3> points;  // corners, then middles of edges [m]
-    std::vector<std::array<vtkIdType, 10>> cells;
-};
-
-QuadraticMesh quadratic(const TetMesh& mesh)
-{
-    QuadraticMesh out;
-    out.points = mesh.points;
-    std::map<std::pair<std::uint32_t, std::uint32_t>, vtkIdType> middle;
-    for (const auto& tet : mesh.tets) {
-        std::array<vtkIdType, 10> cell{};
-        std::copy(tet.begin(), tet.end(), cell.begin());
-        for (std::size_t e = 0; e < edgeCorners.size(); ++e) {
-            const auto [a, b] = std::minmax(tet[edgeCorners[e].first], tet[edgeCorners[e].second]);
-            const auto [at, fresh] = middle.try_emplace({a, b}, static_cast<vtkIdType>(out.points.size()));
-            if (fresh) {
-                out.points.push_back(0.5 * (mesh.points[a] + mesh.points[b]));
-            }
-            cell[4 + e] = at->second;
-        }
-        out.cells.push_back(cell);
-    }
-    return out;
-}
 
 vtkNew<vtkDoubleArray> displacementOf(const std::vector<Vec3>& u)
 {
@@ -309,22 +282,24 @@ vtkNew<vtkDoubleArray> stressOf(const Solver& solver)
 
 std::string vtuText(const TetMesh& mesh, const Solver& solver)
 {
-    const QuadraticMesh q = quadratic(mesh);
+    const QuadraticMesh q(mesh);
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
-    for (const Vec3 p : q.points) {
+    for (const Vec3 p : q.nodes) {
         points->InsertNextPoint(p.x, p.y, p.z);
     }
     vtkNew<vtkUnstructuredGrid> grid;
     grid->SetPoints(points);
-    grid->Allocate(static_cast<vtkIdType>(q.cells.size()));
+    grid->Allocate(static_cast<vtkIdType>(q.tets.size()));
     vtkNew<vtkUnsignedCharArray> tissue;
     tissue->SetName("tissue");
-    for (std::size_t t = 0; t < q.cells.size(); ++t) {
-        grid->InsertNextCell(VTK_QUADRATIC_TETRA, 10, q.cells[t].data());
+    for (std::size_t t = 0; t < q.tets.size(); ++t) {
+        std::array<vtkIdType, 10> cell{};
+        std::ranges::copy(q.tets[t], cell.begin());
+        grid->InsertNextCell(VTK_QUADRATIC_TETRA, 10, cell.data());
         tissue->InsertNextValue(mesh.tissue[t]);
     }
-    grid->GetPointData()->SetVectors(displacementOf(solver.displacement(q.points)));
+    grid->GetPointData()->SetVectors(displacementOf(solver.displacement(q.nodes)));
     grid->GetCellData()->AddArray(stressOf(solver));
     grid->GetCellData()->AddArray(tissue);
     vtkNew<vtkXMLUnstructuredGridWriter> writer;

@@ -1,13 +1,14 @@
 #include <reference/mesh_parts.h>
 
 #include <base/mapped.h>
+#include <reference/groups.h>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <functional>
 #include <numeric>
 
 namespace palpate::reference {
@@ -18,16 +19,6 @@ constexpr double onSide = 1e-3;    // nearer to a flat side means on it [voxels]
 constexpr double lookFrom = 0.25;  // how far before a face what lies behind it is looked for,
 constexpr double lookUntil = 2.5;  // and where that ends [voxels]
 constexpr double flat = 1e-5;      // six volumes of a tetrahedron by the cube of an edge: less is none
-constexpr std::uint32_t none = ~0U;
-
-std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i)
-{
-    while (parent[i] != i) {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    return i;
-}
 
 // Whether the first that is not soft before a face holds the body.
 bool looksAtHeld(const volume::Tissue& tissue, const volume::Tissue::Reader& reader, Vec3 centre, Vec3 step)
@@ -98,59 +89,41 @@ std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t>
     return base::mapped<double>(rows, [&](const std::uint8_t row) { return volume[row]; });
 }
 
-double smallestDihedral(const TetMesh& mesh) noexcept
+std::uint32_t UsedPoints::operator()(std::uint32_t p)
 {
-    double largestCosine = -1.0;
-    for (const auto& tet : mesh.tets) {
-        std::array<Vec3, 4> normals;
-        for (std::size_t side = 0; side < 4; ++side) {
-            const auto& c = faceCorners[side];
-            const Vec3 a = mesh.points[tet[c[0]]];
-            normals[side] = glm::normalize(glm::cross(mesh.points[tet[c[1]]] - a, mesh.points[tet[c[2]]] - a));
-        }
-        for (std::size_t i = 0; i < 4; ++i) {
-            for (std::size_t j = 0; j < i; ++j) {
-                largestCosine = std::max(largestCosine, -glm::dot(normals[i], normals[j]));
-            }
-        }
+    if (to_[p] == unused) {
+        to_[p] = static_cast<std::uint32_t>(points.size());
+        points.push_back(all_[p]);
     }
-    return std::acos(std::clamp(largestCosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+    return to_[p];
 }
 
 void dropUnusedPoints(TetMesh& mesh)
 {
-    std::vector<std::uint32_t> to(mesh.points.size(), none);
-    std::vector<Vec3> points;
+    UsedPoints used(mesh.points);
     for (auto& tet : mesh.tets) {
-        for (auto& p : tet) {
-            if (to[p] == none) {
-                to[p] = static_cast<std::uint32_t>(points.size());
-                points.push_back(mesh.points[p]);
-            }
-            p = to[p];
-        }
+        std::ranges::transform(tet, tet.begin(), std::ref(used));
     }
-    mesh.points = std::move(points);
+    mesh.points = std::move(used.points);
 }
 
 double keepLargestPiece(TetMesh& mesh)
 {
-    std::vector<std::uint32_t> parent(mesh.tets.size());
-    std::iota(parent.begin(), parent.end(), 0U);
+    Groups pieces(mesh.tets.size());
     const auto faces = sortedFaces(mesh);
     for (std::size_t i = 1; i < faces.size(); ++i) {
         if (faces[i].key == faces[i - 1].key) {
-            parent[rootOf(parent, faces[i].tet)] = rootOf(parent, faces[i - 1].tet);
+            pieces.join(faces[i].tet, faces[i - 1].tet);
         }
     }
     std::vector<double> volume(mesh.tets.size(), 0.0);
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        volume[rootOf(parent, static_cast<std::uint32_t>(t))] += sixVolumes(mesh, t) / 6.0;
+        volume[pieces.root(static_cast<std::uint32_t>(t))] += sixVolumes(mesh, t) / 6.0;
     }
     const auto largest = static_cast<std::uint32_t>(std::max_element(volume.begin(), volume.end()) - volume.begin());
     TetMesh kept;
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        if (rootOf(parent, static_cast<std::uint32_t>(t)) == largest) {
+        if (pieces.root(static_cast<std::uint32_t>(t)) == largest) {
             kept.tets.push_back(mesh.tets[t]);
             kept.tissue.push_back(mesh.tissue[t]);
         }

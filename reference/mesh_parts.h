@@ -27,8 +27,22 @@ double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept;
 double sixVolumes(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept;
 /// Volume of each tissue [m^3] (rows x 1).
 std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t> rows);
-/// Of all tetrahedra [degrees].
-double smallestDihedral(const TetMesh& mesh) noexcept;
+
+/// Numbers points anew, those that are asked for only, in the order of their first use.
+class UsedPoints {
+public:
+    /// @param all  must outlive this
+    explicit UsedPoints(const std::vector<Vec3>& all) : all_(all), to_(all.size(), unused) {}
+
+    std::uint32_t operator()(std::uint32_t p);  // number in `points` of one of all
+
+    std::vector<Vec3> points;  // used so far [m]
+
+private:
+    static constexpr std::uint32_t unused = ~0U;
+    const std::vector<Vec3>& all_;
+    std::vector<std::uint32_t> to_;  // (all x 1)
+};
 
 /// Leaves the points that tetrahedra have, in the order of their first use.
 void dropUnusedPoints(TetMesh& mesh);

@@ -88,6 +88,15 @@ std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noex
     return dihedralsOf(mesh, mesh.tets[tet]);
 }
 
+double smallestDihedral(const TetMesh& mesh) noexcept
+{
+    double least = 180.0;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        least = std::min(least, dihedralsOf(mesh, t).first);
+    }
+    return least;
+}
+
 double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept
 {
     if (sixVolumes(mesh, tet) <= 0.0) {

@@ -42,6 +42,9 @@ struct MeshQuality {
 /// Least and largest dihedral angle of one tetrahedron [degrees].
 std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noexcept;
 
+/// The least one of all tetrahedra [degrees].
+double smallestDihedral(const TetMesh& mesh) noexcept;
+
 /// Dihedral angle of a tetrahedron of these points that is nearest to 0 or 180 degrees, from there; -1 where it is flipped
 /// [degrees].
 double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept;

@@ -4,6 +4,7 @@
 #include <reference/label_pieces.h>
 #include <reference/mesh_domain.h>
 #include <reference/mesh_parts.h>
+#include <reference/mesh_quality.h>
 #include <reference/refill.h>
 
 #include <algorithm>

@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/units.h>
 #include <reference/equilibrium.h>
+#include <reference/groups.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -12,7 +13,6 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <numeric>
 #include <optional>
 
 namespace palpate::reference {
@@ -54,22 +54,15 @@ void checkMesh(const TetMesh& mesh, std::span<const Material> materials, const S
 // Throws when tetrahedra that share no point, not even by others, are left over.
 void checkOneBody(const TetMesh& mesh)
 {
-    std::vector<std::uint32_t> group(mesh.points.size());
-    std::iota(group.begin(), group.end(), 0U);
-    const auto root = [&](std::uint32_t p) {
-        while (group[p] != p) {
-            p = group[p] = group[group[p]];
-        }
-        return p;
-    };
+    Groups bodies(mesh.points.size());
     for (const auto& tet : mesh.tets) {
         for (const std::uint32_t p : tet) {
-            group[root(p)] = root(tet[0]);
+            bodies.join(p, tet[0]);
         }
     }
     std::size_t apart = 0;
     for (const auto& tet : mesh.tets) {
-        apart += root(tet[0]) != root(mesh.tets.front()[0]) ? 1 : 0;
+        apart += bodies.root(tet[0]) != bodies.root(mesh.tets.front()[0]) ? 1 : 0;
     }
     base::failIf(apart > 0, "mesh: {} of {} tetrahedra are not connected with the first one: keep one body", apart,
                  mesh.tets.size());

@@ -1,17 +1,17 @@
 #include <reference/surfaces.h>
 
+#include <reference/groups.h>
 #include <reference/mesh_parts.h>
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
+#include <functional>
 #include <map>
-#include <numeric>
 
 namespace palpate::reference {
 
 namespace {
-
-constexpr std::uint32_t noVertex = ~0U;
 
 // Middle and radius of the sphere that touches all four sides [m].
 std::pair<Vec3, double> innerSphere(const TetMesh& mesh, std::size_t tet)
@@ -29,26 +29,8 @@ std::pair<Vec3, double> innerSphere(const TetMesh& mesh, std::size_t tet)
     return {middle / area, sixVolumes(mesh, tet) / area};
 }
 
-// Pieces of one tissue that hang together by faces.
-class TissuePieces {
-public:
-    explicit TissuePieces(std::size_t tets) : parent_(tets) { std::iota(parent_.begin(), parent_.end(), 0U); }
-
-    void join(std::uint32_t a, std::uint32_t b) { parent_[root(a)] = root(b); }
-    std::uint32_t root(std::uint32_t i)
-    {
-        while (parent_[i] != i) {
-            parent_[i] = parent_[parent_[i]];
-            i = parent_[i];
-        }
-        return i;
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
-
-void addSeeds(const TetMesh& mesh, TissuePieces& pieces, Surfaces& out)
+// @param pieces  of one tissue that hang together by faces
+void addSeeds(const TetMesh& mesh, Groups& pieces, Surfaces& out)
 {
     std::map<std::uint32_t, double> radius;  // of the largest sphere so far, by the piece's root
     std::map<std::uint32_t, Surfaces::Seed> seeds;
@@ -68,18 +50,11 @@ void addSeeds(const TetMesh& mesh, TissuePieces& pieces, Surfaces& out)
 // Leaves the points that a facet has.
 void dropUnused(Surfaces& surfaces)
 {
-    std::vector<std::uint32_t> to(surfaces.points.size(), noVertex);
-    std::vector<Vec3> points;
+    UsedPoints used(surfaces.points);
     for (auto& facet : surfaces.facets) {
-        for (auto& p : facet.points) {
-            if (to[p] == noVertex) {
-                to[p] = static_cast<std::uint32_t>(points.size());
-                points.push_back(surfaces.points[p]);
-            }
-            p = to[p];
-        }
+        std::ranges::transform(facet.points, facet.points.begin(), std::ref(used));
     }
-    surfaces.points = std::move(points);
+    surfaces.points = std::move(used.points);
 }
 
 }  // namespace
@@ -88,7 +63,7 @@ Surfaces surfacesOf(const TetMesh& mesh, AllPoints all)
 {
     Surfaces out;
     out.points = mesh.points;
-    TissuePieces pieces(mesh.tets.size());
+    Groups pieces(mesh.tets.size());
     const auto faces = sortedFaces(mesh);
     for (std::size_t i = 0; i < faces.size(); ++i) {
         const std::uint32_t tet = faces[i].tet;
