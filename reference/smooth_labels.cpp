@@ -1,16 +1,14 @@
 #include <reference/smooth_labels.h>
 
-#include <base/error.h>
+#include <reference/soft_voxels.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <stdexcept>
 
 namespace palpate::reference {
 
@@ -18,120 +16,11 @@ namespace {
 
 constexpr double blur = 1.0;          // standard deviation of the Gaussian [voxels]
 constexpr int gaussReach = 3;         // of the Gaussian [voxels]
-constexpr double sheer = 0.8;         // a side is flat when its last layer has this fraction of the layer two before
-constexpr double onItsBack = 0.05;    // fraction of the depth that is held when nothing else is: Tissue::support()
 constexpr double full = 65535.0;      // a fraction of one
 constexpr double pure = 0.98;         // share from which on a voxel is one tissue throughout
 constexpr double maxBias = 0.45;      // beyond it a bias would drown the shares
 constexpr double closeEnough = 1e-3;  // of a region's volume
 constexpr int fitPasses = 6;
-
-// Row of the tissue table of every voxel in a box; 0 where it is not soft.
-struct SoftVoxels {
-    Index3 low{0}, size{0};
-    std::vector<std::uint8_t> row;
-    bool held = false;  // there is tissue that holds the body
-
-    std::size_t offset(Index3 n) const noexcept { return base::offsetOf(size, n); }
-};
-
-// The voxels that the body's box touches.
-std::pair<Index3, Index3> voxelRange(const volume::Tissue& tissue)
-{
-    const auto box = tissue.box();
-    Vec3 low(1e30), high(-1e30);
-    for (int c = 0; c < 8; ++c) {
-        const Vec3 corner((c & 1) != 0 ? box.high.x : box.low.x, (c & 2) != 0 ? box.high.y : box.low.y,
-                          (c & 4) != 0 ? box.high.z : box.low.z);
-        const Vec3 index = tissue.affine().toIndex(corner);
-        low = glm::min(low, index);
-        high = glm::max(high, index);
-    }
-    return {glm::clamp(Index3(glm::floor(low)), Index3(0), tissue.size() - 1),
-            glm::clamp(Index3(glm::ceil(high)), Index3(0), tissue.size() - 1)};
-}
-
-// The part of `all` between two of its voxels.
-SoftVoxels cropped(const SoftVoxels& all, Index3 first, Index3 last)
-{
-    SoftVoxels part;
-    part.held = all.held;
-    part.low = all.low + first;
-    part.size = last - first + 1;
-    part.row.reserve(part.offset({0, 0, part.size.z}));
-    volume::forEachIndex(first, last, [&](Index3 n) { part.row.push_back(all.row[all.offset(n)]); });
-    return part;
-}
-
-SoftVoxels readVoxels(const volume::Tissue& tissue, Keep keep)
-{
-    const auto [first, last] = voxelRange(tissue);
-    SoftVoxels all;
-    all.low = first;
-    all.size = last - first + 1;
-    all.row.assign(all.offset({0, 0, all.size.z}), 0);
-    const auto& rows = tissue.table().rows;
-    const volume::Tissue::Reader reader(tissue);
-    Index3 low = all.size, high(-1);
-    volume::forEachIndex(Index3(0), all.size - 1, [&](Index3 n) {
-        const std::uint8_t row = reader.tissue(tissue.affine().toPatient(Vec3(n + all.low)));
-        if (keep == Keep::soft && isHeld(rows[row])) {
-            all.held = true;
-        } else if (rows[row].role != volume::Role::air) {
-            all.row[all.offset(n)] = row;
-            low = glm::min(low, n);
-            high = glm::max(high, n);
-        }
-    });
-    if (glm::any(glm::greaterThan(low, high))) {
-        throw std::runtime_error(keep == Keep::all
-                                     ? "volume: there is no tissue in it to mesh: all of it is air"
-                                     : "volume: there is no soft tissue in it to mesh: all of it is air, bone or fixed");
-    }
-    return cropped(all, low, high);
-}
-
-// Leaves out the rear of a body that nothing holds. Returns the side where it ends now.
-int layOnItsBack(const volume::Affine& affine, SoftVoxels& voxels)
-{
-    int axis = 0;
-    for (int a = 1; a < 3; ++a) {
-        axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
-    }
-    base::failIf(
-        voxels.size[axis] < 2,
-        "volume: it is one voxel thick from front to back and nothing holds it: its rear layer, which would be held, "
-        "is all there is; mark a tissue as fixed, or use smaller voxels");
-    const bool backIsHigh = affine.linear[axis].y > 0.0;
-    const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * voxels.size[axis])));
-    Index3 first(0), last = voxels.size - 1;
-    (backIsHigh ? last : first)[axis] += backIsHigh ? -layers : layers;
-    voxels = cropped(voxels, first, last);
-    return 2 * axis + (backIsHigh ? 1 : 0);
-}
-
-std::size_t softInLayer(const SoftVoxels& voxels, int axis, int layer)
-{
-    Index3 first(0), last = voxels.size - 1;
-    first[axis] = last[axis] = layer;
-    std::size_t count = 0;
-    volume::forEachIndex(first, last, [&](Index3 n) { count += voxels.row[voxels.offset(n)] != 0 ? 1U : 0U; });
-    return count;
-}
-
-// A round end has few voxels in its last layer, a plane as many as further in.
-std::array<bool, 6> flatSides(const SoftVoxels& voxels)
-{
-    std::array<bool, 6> flat{};
-    for (int side = 0; side < 6; ++side) {
-        const int axis = side / 2, end = voxels.size[axis] - 1;
-        const int layer = side % 2 == 0 ? 0 : end;
-        const int inner = side % 2 == 0 ? std::min(2, end) : std::max(end - 2, 0);
-        flat[static_cast<std::size_t>(side)] = static_cast<double>(softInLayer(voxels, axis, layer)) >=
-                                               sheer * static_cast<double>(softInLayer(voxels, axis, inner));
-    }
-    return flat;
-}
 
 std::array<float, 2 * gaussReach + 1> gaussian()
 {
@@ -416,11 +305,6 @@ void fitRow(SmoothLabels& labels, const BorderPoints& points, std::size_t row, d
 }
 
 }  // namespace
-
-bool isHeld(const volume::TissueRow& row) noexcept
-{
-    return row.fixed || row.role == volume::Role::bone;
-}
 
 // Source of the numbers: as in samplePoints() of the mesher.
 Vec3 countedAt(Index3 n, int eighth) noexcept
