@@ -18,9 +18,9 @@ std::vector<Vec3> quadraticNodes(const TetMesh& mesh);
 void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file);
 
 /// Writes what Solver::prescribe() solves with P2 elements as input of CalculiX: C3D10, mm and kPa, `*ELASTIC`, or
-/// `*HYPERELASTIC, NEO HOOKE` with `NLGEOM`, whose energy is ours where nothing stiffens: C10 = mu/2, D1 = 2/K. Throws
-/// std::runtime_error for tissue that stiffens with finite strain, or a file that cannot be written.
-/// Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
+/// `*HYPERELASTIC, NEO HOOKE` with `NLGEOM`, whose energy is that of the reference where nothing stiffens: C10 = mu/2, D1 =
+/// 2/K; the kernel's is another (volume/law.h). Throws std::runtime_error for tissue that stiffens with finite strain, or a
+/// file that cannot be written. Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
 void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
                const std::filesystem::path& file);
 /// The text of that file. @pre checkCcx()
