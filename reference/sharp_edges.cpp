@@ -15,7 +15,7 @@ namespace {
 constexpr double inset = 1e-3;        // how far inside the body the regions on a side are read [voxels]
 constexpr double shortestLine = 0.1;  // shorter ones are left out,
 constexpr double shortestRing = 4.0;  // and so are such rings [voxels]
-constexpr double same = 1e-5;         // nearer points are one [voxels]
+constexpr double same = 0.01;         // nearer points are one: lines so near would be edges of slivers [voxels]
 constexpr int halvings = 40;
 
 // Points in samples, and which are joined.
@@ -111,11 +111,7 @@ public:
 
     void trace()
     {
-        for (int j = 0; j < nv_; ++j) {
-            for (int i = 0; i < nu_; ++i) {
-                square(i, j);
-            }
-        }
+        // The rim first: what is near to a corner of the body becomes one with it, and not the corner with that.
         for (int i = 0; i < nu_; ++i) {
             rim(i, 0, i + 1, 0);
             rim(i, nv_, i + 1, nv_);
@@ -123,6 +119,11 @@ public:
         for (int j = 0; j < nv_; ++j) {
             rim(0, j, 0, j + 1);
             rim(nu_, j, nu_, j + 1);
+        }
+        for (int j = 0; j < nv_; ++j) {
+            for (int i = 0; i < nu_; ++i) {
+                square(i, j);
+            }
         }
     }
 
