@@ -30,13 +30,14 @@ std::string pressBeside(const Folder& folder, const std::string& tool, bool hasP
     return file;
 }
 
-// Beside the lump the ball feels less of it than over it, and is pushed away from it.
+// Beside the lump the ball feels less of it than over it, and is pushed away from it: by 2.6 to 3.1 % of the force on
+// meshes of 4 and 5 mm, but by 1.0 to 1.3 % on those of 8 mm.
 TEST(ReferenceCommand, PressesWhereAnotherReferenceDoes)
 {
     const Folder folder;
     writeText(folder / "small.toml", sceneText);
     const auto solved = [&](std::vector<std::string> more) {
-        std::vector<std::string> arguments{folder / "small.toml", "--looks", "3", "--size", "8", "--json",
+        std::vector<std::string> arguments{folder / "small.toml", "--looks", "3", "--size", "5", "--json",
                                            folder / "r.json"};
         arguments.insert(arguments.end(), more.begin(), more.end());
         const Outcome o = Program("palpate-reference", arguments).wait();
