@@ -94,6 +94,7 @@ TEST(ReplayView, ARecordThatIsStillWrittenIsShownAsFarAsItWas)
     for (int i = 0; i < 600 && palpate({"score", folder / "s.db"}).status != 0; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     ASSERT_TRUE(session.running());
+    std::this_thread::sleep_for(std::chrono::seconds(2));  // what is written first may be one tick
     const Outcome outcome = Program("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures",
                                                      "--frames", "2", "--size", "320x320"})
                                 .wait();
