@@ -59,7 +59,8 @@ TEST_F(PressCommand, AToolSmallerThanACellIsSaidToBe)
 {
     const Outcome small = palpate({"press", scene, "--path", path, "--radius-mm", "1"});
     EXPECT_EQ(small.status, 0) << small.err;
-    EXPECT_NE(small.err.find("less than 1.25 cells of 2 mm: the force depends on where it lies"), std::string::npos) << small.err;
+    EXPECT_NE(small.err.find("less than 1.25 cells of 2 mm: the force depends on where it lies"), std::string::npos)
+        << small.err;
     EXPECT_EQ(palpate({"press", scene, "--path", path, "--radius-mm", "3"}).err, "");
 }
 
