@@ -223,11 +223,12 @@ void warnOfSmall(const Run& run)
     constexpr double fewestCells = 1.25;  // of a radius, from which on the place between the nodes hardly matters
     const double spacing = run.model.lattice.grid.spacing, radius = run.press.tool.radius;
     if (run.press.tool.kind != ToolKind::needle && radius < fewestCells * spacing) {
-        fmt::print(stderr,
-                   "palpate press: the tool's radius of {:g} mm is less than {:g} cells of {:g} mm: the force depends on where it "
-                   "lies between nodes (up to 16 % off at one cell, over 60 % at a quarter of one); a smaller "
-                   "[model.elastic] spacing_mm resolves it\n",
-                   1e3 * radius, fewestCells, 1e3 * spacing);
+        fmt::print(
+            stderr,
+            "palpate press: the tool's radius of {:g} mm is less than {:g} cells of {:g} mm: the force depends on where it "
+            "lies between nodes (up to 16 % off at one cell, over 60 % at a quarter of one); a smaller "
+            "[model.elastic] spacing_mm resolves it\n",
+            1e3 * radius, fewestCells, 1e3 * spacing);
     }
 }
 
