@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <string_view>
+#include <vector>
 
 namespace palpate::base {
 
@@ -36,6 +37,29 @@ constexpr bool isUtf8(std::string_view text) noexcept
         i += length;
     }
     return true;
+}
+
+struct Character {
+    std::string_view bytes;  // of the text
+    char32_t code = 0;
+};
+
+/// The characters of a text in UTF-8; a byte that is none is its own code.
+inline std::vector<Character> charactersOf(std::string_view text)
+{
+    std::vector<Character> all;
+    for (std::size_t from = 0, end = 0; from < text.size(); from = end) {
+        for (end = from + 1; end < text.size() && !beginsCharacter(text[end]); ++end) {
+        }
+        const std::string_view bytes = text.substr(from, end - from);
+        const auto bits = [&](std::size_t i, unsigned mask) { return static_cast<unsigned char>(bytes[i]) & mask; };
+        char32_t code = bits(0, bytes.size() > 1 ? 0x7FU >> bytes.size() : 0xFFU);
+        for (std::size_t i = 1; i < bytes.size(); ++i) {
+            code = code << 6U | bits(i, 0x3FU);
+        }
+        all.push_back({bytes, code});
+    }
+    return all;
 }
 
 }  // namespace palpate::base

@@ -458,19 +458,17 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
     }
     divideCells(std::move(split), first.held, levels.front());
     addDiagonal(levels.front());
+    std::vector<std::vector<float>> held{first.held};
     while (levels.size() < count) {
         std::vector<float> coarser;
         std::vector<std::uint8_t> looser;
-        levels.push_back(Coarsening(levels.back(), first.held, loose).level(coarser, looser));
+        levels.push_back(Coarsening(levels.back(), held.back(), loose).level(coarser, looser));
         addDiagonal(levels.back());
-        if (levels.size() > 2) {
-            yieldWhereHeld(first.held, levels[levels.size() - 2]);
-        }
-        first.held = std::move(coarser);
+        held.push_back(std::move(coarser));
         loose = std::move(looser);
     }
-    if (levels.size() > 1) {
-        yieldWhereHeld(first.held, levels.back());
+    for (std::size_t l = 1; l < levels.size(); ++l) {
+        yieldWhereHeld(held[l], levels[l]);
     }
     CellLevel whole = first.level;
     addLayers(first, finest.held, surface, whole);

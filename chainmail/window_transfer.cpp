@@ -212,8 +212,8 @@ Vec3 continued(const Window& w, Field field, const float* holds, Index3 n) noexc
 }  // namespace
 
 // Nodes that hold no tissue in the fine window, but may in the coarse one, have no displacement of their own. Beside a gap
-// they keep what they have: a line would lead across it. What the coarse window solves itself, on the
-// fine one's border, and what it holds has nothing to take.
+// they keep what they have: a line would lead across it. Nothing is taken where the coarse window solves itself, as on the
+// fine one's border; what it holds is at rest.
 void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept
 {
     const bool hasGaps = !fine.fragments.placed().empty() || !coarse.fragments.placed().empty();

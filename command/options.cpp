@@ -1,15 +1,14 @@
 #include <command/options.h>
 
 #include <base/error.h>
+#include <base/split.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <system_error>
 #include <utility>
 
 namespace palpate::command {
@@ -31,11 +30,10 @@ void addSetting(CLI::App& command, session::SceneChanges& changes)
 std::string seedFault(const std::string& text)
 {
     constexpr auto most = std::numeric_limits<std::int64_t>::max();  // that a scene can hold
-    const char* const end = text.data() + text.size();
-    std::int64_t value = -1;
-    const auto [stopped, failed] = std::from_chars(text.data(), end, value);
-    const bool whole = failed == std::errc() && stopped == end && text.front() != '-';
-    return whole ? "" : fmt::format("{}: must be a whole number from 0 to {}", text, most);
+    const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
+    return digits && base::numberIn<std::int64_t>(text)
+               ? ""
+               : fmt::format("{}: must be a whole number from 0 to {}", text, most);
 }
 
 void refuseNoValues(CLI::App& app)

@@ -9,7 +9,6 @@
 #include <array>
 #include <filesystem>
 #include <iterator>
-#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -27,39 +26,16 @@ constexpr std::array<ImWchar, 27> letters{0x20,   0x52F,  0x531,  0x6FF,  0x7C0,
                                           0x10FF, 0x1401, 0x1676, 0x1E00, 0x1FFE, 0x2010, 0x205E, 0x20A0, 0x20BF,
                                           0x2C60, 0x2D6F, 0xA4D0, 0xA4FF, 0xFB00, 0xFDFF, 0xFE70, 0xFEFC, 0};
 
-struct Character {
-    std::string_view bytes;
-    char32_t code = 0;
-};
-
-// Of UTF-8; a byte that is none is its own code.
-std::vector<Character> charactersOf(std::string_view text)
-{
-    std::vector<Character> all;
-    for (std::size_t from = 0, end = 0; from < text.size(); from = end) {
-        for (end = from + 1; end < text.size() && !base::beginsCharacter(text[end]); ++end) {
-        }
-        const std::string_view bytes = text.substr(from, end - from);
-        const auto bits = [&](std::size_t i, unsigned mask) { return static_cast<unsigned char>(bytes[i]) & mask; };
-        char32_t code = bits(0, bytes.size() > 1 ? 0x7FU >> bytes.size() : 0xFFU);
-        for (std::size_t i = 1; i < bytes.size(); ++i) {
-            code = code << 6U | bits(i, 0x3FU);
-        }
-        all.push_back({bytes, code});
-    }
-    return all;
-}
-
-bool isRightToLeft(const Character& c)
+bool isRightToLeft(const base::Character& c)
 {
     const auto within = [&](char32_t low, char32_t high) { return low <= c.code && c.code <= high; };
     return within(0x590, 0x7FF) || within(0xFB1D, 0xFDFF) || within(0xFE70, 0xFEFC);
 }
 
 // Words and what is between them.
-void turnRightToLeft(std::vector<Character>& all)
+void turnRightToLeft(std::vector<base::Character>& all)
 {
-    const auto neither = [](const Character& c) { return c.code != ' ' && !isRightToLeft(c); };
+    const auto neither = [](const base::Character& c) { return c.code != ' ' && !isRightToLeft(c); };
     for (auto from = std::ranges::find_if(all, isRightToLeft); from != all.end();) {
         auto end = std::find_if(from, all.end(), neither);
         const auto next = end;
@@ -118,11 +94,11 @@ std::string drawable(const std::string& text)
         return text;
     }
     const ImFont& font = *ImGui::GetIO().Fonts->Fonts[0];
-    std::vector<Character> all = charactersOf(text);
+    std::vector<base::Character> all = base::charactersOf(text);
     turnRightToLeft(all);
     std::string out;
     bool codes = false;
-    for (const Character& c : all) {
+    for (const base::Character& c : all) {
         const bool whole = c.bytes.size() > 1 || c.code < 0x80;
         const bool drawn = c.code < 0x20 ||
                            (whole && c.code <= 0xFFFF && font.FindGlyphNoFallback(static_cast<ImWchar>(c.code)) != nullptr);

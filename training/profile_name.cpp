@@ -7,7 +7,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <string_view>
 
 namespace palpate::training {
 
@@ -42,22 +41,6 @@ bool isIn(std::span<const Range> ranges, char32_t c)
     return std::ranges::any_of(ranges, [c](const Range& r) { return c >= r.first && c <= r.last; });
 }
 
-// @pre  isUtf8(text)
-std::u32string charactersOf(std::string_view text)
-{
-    std::u32string out;
-    for (const char byte : text) {
-        const auto b = static_cast<unsigned char>(byte);
-        if (base::beginsCharacter(byte)) {
-            const unsigned mask = b < 0x80 ? 0x7FU : b < 0xE0 ? 0x1FU : b < 0xF0 ? 0x0FU : 0x07U;
-            out.push_back(b & mask);
-        } else {
-            out.back() = (out.back() << 6U) | (b & 0x3FU);
-        }
-    }
-    return out;
-}
-
 }  // namespace
 
 void checkProfileName(const std::string& name)
@@ -66,9 +49,9 @@ void checkProfileName(const std::string& name)
         std::ranges::any_of(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
     base::failIf(name.empty() || name.size() > 100 || control || !base::isUtf8(name),
                  "profile '{}': must be 1 to 100 bytes of text (UTF-8) in one line", name);
-    const std::u32string characters = charactersOf(name);
+    const auto characters = base::charactersOf(name);
     for (std::size_t i = 0; i < characters.size(); ++i) {
-        const char32_t c = characters[i];
+        const char32_t c = characters[i].code;
         const char* const wrong = isIn(unseen, c)   ? "cannot be seen: leave it out"
                                   : isIn(blanks, c) ? "is no plain blank: type one"
                                   : isIn(apart, c)

@@ -412,8 +412,7 @@ Erased ProfileStore::erase(const Person& person)
         Statement(*database_, "DELETE FROM person WHERE id = ?", person.id).run();
         all.commit();
         // Overwritten in the file by secure_delete; now also out of the write-ahead log and the free pages.
-        emptyLog();
-        database_->execute("VACUUM");
+        database_->execute("PRAGMA wal_checkpoint(TRUNCATE); VACUUM");
         emptyLog();
     });
     return erased;
