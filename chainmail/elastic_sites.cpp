@@ -134,7 +134,8 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 }
 
 // Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches less
-// than the cells of a window resolve, by Hertz's radius of what it touches. Tissue that something rigid confines gives way
+// than the cells of a window resolve, by Hertz's radius of what it touches; less so the deeper it is in its radii (measured
+// beside finite elements: docs/kernel.md). Tissue that something rigid confines gives way
 // less under the same pressure, by f^(1/3) where it bears f times what a half-space would at this depth, and so may they:
 // that is by how much the patch is wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force
 // on a small patch may be twice too large, and tissue that relaxes, whose force falls while it lies as before, take the
@@ -146,8 +147,9 @@ void Elastic::spreadPressure() noexcept
     const ContactSite* before = nullptr;
     double patch = 0.0;  // radius, in cells
     double confined = 1.0;
-    double most = 0.0;  // stiffness per area
-    Between across;     // where its middle is
+    double lessDeep = 1.0;  // of what cells lack
+    double most = 0.0;      // stiffness per area
+    Between across;         // where its middle is
     for (ContactSite& s : active()) {
         if (s.isTie) {
             continue;
@@ -162,8 +164,9 @@ void Elastic::spreadPressure() noexcept
             const double byForce =
                 knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
             patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
-            const double shallow = std::max(1.0 - glm::length(tool.pushed) / tool.shape.widest(), 0.0);
-            confined = byForce > byDepth ? std::pow(byForce / byDepth, shallow) : 1.0;
+            const double deep = glm::length(tool.pushed) / tool.shape.widest();  // [radii]
+            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + deep) : 1.0;
+            confined = byForce > byDepth ? std::pow(byForce / byDepth, std::max(1.0 - deep, 0.0)) : 1.0;
             across = betweenNodes(grid, tool);
             most = stiffestPerArea(tool);
             before = &s;
@@ -172,7 +175,7 @@ void Elastic::spreadPressure() noexcept
         const Stretch now = volume::isSmall(options_.law) ? Stretch{}
                             : s.stretch > 0.0             ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
                                                           : stretchAt(s);
-        const double share = resolvedShare(patch, across, static_cast<double>(s.lacks));
+        const double share = resolvedShare(patch, across, lessDeep * static_cast<double>(s.lacks));
         s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
         const double bound = most * static_cast<double>(s.area);
         const double atRest = std::max(s.atRest, std::min(confined * s.atRest, bound));
