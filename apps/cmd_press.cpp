@@ -218,8 +218,11 @@ void write(const PressArguments& o, const Run& run)
     }
 }
 
-void warnOfSmall(const Run& run)
+void warnOfCells(const Run& run)
 {
+    if (const std::string wider = session::widerCells(run.model); !wider.empty()) {
+        fmt::print(stderr, "palpate press: {}\n", wider);
+    }
     constexpr double fewestCells = 1.25;  // of a radius, from which on the place between the nodes hardly matters
     const double spacing = run.model.lattice.grid.spacing, radius = run.press.tool.radius;
     if (run.press.tool.kind != ToolKind::needle && radius < fewestCells * spacing) {
@@ -269,7 +272,7 @@ void runPress(const PressArguments& o)
         run.points = studies::loadPoints(o.at);
     }
     progress.clear();
-    warnOfSmall(run);
+    warnOfCells(run);
     warnOfStartInside(run);
     const auto ticks = static_cast<double>(run.path.ticks());
     try {

@@ -231,6 +231,9 @@ haptics::SessionModel openModel(TrainArguments& o)
     haptics::SessionModel model = session::openSession(o.scene, o.changes);
     const std::string why = o.anyway ? "" : session::whyTooSlow(session::rehearse(model), !o.unpaced);
     base::failIf(!why.empty(), "{}: {}", o.scene, why);
+    if (const std::string wider = session::widerCells(model); !wider.empty()) {
+        fmt::print(stderr, "palpate: warning: {}: {}\n", o.scene, wider);
+    }
     return model;
 }
 

@@ -74,10 +74,10 @@ def pressed(file, radius, depths, hold=0.2, side=0.0):
     return np.array([-float(samples[np.abs(times - t).argmin()]["force_y_n"]) for t in looks])
 
 
-def reference_forces(text, folder, radius, depths):
-    """The same by finite elements, of a body that is alike on both sides of x = 0 and of z = 0."""
+def reference_forces(text, folder, radius, depths, size=2):
+    """The same by finite elements of `size` [mm] at the ball, of a body that is alike on both sides of x = 0 and of z = 0."""
     file = pathlib.Path(folder) / "reference.toml"
     file.write_text(text.replace("SETTING", "default"))
-    out = run("palpate-reference", file, "--law", "neo-hookean", "--size", "2", "--radius-mm", str(radius), "--mirrored", "xz", "--looks",
+    out = run("palpate-reference", file, "--law", "neo-hookean", "--size", str(size), "--radius-mm", str(radius), "--mirrored", "xz", "--looks",
               ",".join(map(str, depths)), "--json", "-")
     return np.array([-look["force_n"][1] for look in json.loads(out)["looks"]])

@@ -208,6 +208,19 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     return haptics::buildModel(std::move(scene), !changes.tool);
 }
 
+std::string widerCells(const haptics::SessionModel& model)
+{
+    constexpr double rounding = 1e-9;  // relative
+    const datasets::ModelSettings& asked = model.scene.model;
+    const bool isElastic = asked.level == datasets::ModelLevel::elastic;
+    const double wanted = isElastic ? asked.elastic.spacing : asked.spacing, has = model.lattice.grid.spacing;
+    return has <= (1.0 + rounding) * wanted ? ""
+                                            : fmt::format(
+                                                  "the body has cells of {:.2g} mm: of the {:g} mm that [{}] spacing_mm "
+                                                  "asks for it would be over 4 million",
+                                                  1e3 * has, 1e3 * wanted, isElastic ? "model.elastic" : "model");
+}
+
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
 {
     auto model = haptics::buildModel(datasets::parseScene(info.sceneText, info.sceneOrigin));

@@ -54,6 +54,9 @@ volume::Tissue loadVolume(const std::filesystem::path& file);
 /// the volume and builds the model. Throws std::runtime_error, also for a change that has nothing to change.
 haptics::SessionModel openSession(const std::string& what, SceneChanges changes);
 
+/// Words where the body's cells are wider than the scene asks for, since finer ones would be over 4 million; else "".
+std::string widerCells(const haptics::SessionModel& model);
+
 /// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now, and
 /// when the record says something else of its scene than the scene does.
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info);
