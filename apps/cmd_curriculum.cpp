@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/listed.h>
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/quantiles.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
@@ -49,14 +50,10 @@ std::string levelInWords(const training::Level& level)
 void listCurricula(const CurriculumArguments& o)
 {
     const auto all = listed("curricula", training::allCurricula);
-    auto figures = nlohmann::json::array();
-    for (const Curriculum& c : all) {
-        figures.push_back({{"id", c.id},
-                           {"title", c.title},
-                           {"about", c.about},
-                           {"exercises", c.exercises.size()},
-                           {"file", c.file.string()}});
-    }
+    const auto figures = base::mapped<nlohmann::json>(all, [](const Curriculum& c) -> nlohmann::json {
+        const std::size_t count = c.exercises.size();
+        return {{"id", c.id}, {"title", c.title}, {"about", c.about}, {"exercises", count}, {"file", c.file.string()}};
+    });
     command::writeJson(o.json, {{"curricula", figures}});
     if (o.json != "-") {
         for (const Curriculum& c : all) {

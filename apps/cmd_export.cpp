@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <channel/deformation.h>
@@ -181,10 +182,9 @@ std::string exportState(const ExportArguments& o, const volume::ExportOptions& h
     } else {
         volume::exportVectors(o.output, state.grid(), o.what == "inverse" ? state.inverse() : state.displacement(), how);
     }
-    double most = 0;
-    for (const chainmail::Node n : state.shape().moved()) {
-        most = std::max(most, 1e3 * static_cast<double>(glm::length(state.shape().u()[n])));
-    }
+    const double most = base::largestOf(state.shape().moved(), [&](chainmail::Node n) {
+        return 1e3 * static_cast<double>(glm::length(state.shape().u()[n]));
+    });
     figures["tick"] = state.tick();
     figures["moved_nodes"] = state.shape().moved().size();
     figures["largest_displacement_mm"] = most;
@@ -211,10 +211,7 @@ std::string exportCt(const ExportArguments& o, const std::function<void(double)>
 // moment of the stored image `like`, or the session's own.
 std::string exportUltrasound(const ExportArguments& o, const std::function<void(double)>& progress)
 {
-    std::optional<ultrasound::StoredHow> like;
-    if (!o.like.empty()) {
-        like = ultrasound::readStored(o.like);
-    }
+    const auto like = o.like.empty() ? std::nullopt : std::optional(ultrasound::readStored(o.like));
     const double at = like ? static_cast<double>(like->image.tick) / haptics::Record(o.record).info().rate : timeFrom(o.at);
     const session::ShownState shown =
         session::shownState(o.record, at, like ? std::optional(like->image.shapeTick) : std::nullopt, progress);

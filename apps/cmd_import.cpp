@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <command/json.h>
@@ -13,6 +14,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <new>
 #include <optional>
@@ -47,10 +50,9 @@ nlohmann::json importFigures(const prepare::ImportedVolume& made)
 {
     nlohmann::json figures = report::volumeFigures(made.tissue);
     figures["steps"] = prepare::stepFigures(made.steps);
-    figures["overlaps"] = nlohmann::json::array();
-    for (const volume::Overlap& o : made.overlaps) {
-        figures["overlaps"].push_back({{"kept", o.kept}, {"lost", o.lost}, {"voxels", o.voxels}});
-    }
+    figures["overlaps"] = base::mapped<nlohmann::json>(made.overlaps, [](const volume::Overlap& o) {
+        return nlohmann::json{{"kept", o.kept}, {"lost", o.lost}, {"voxels", o.voxels}};
+    });
     return figures;
 }
 
@@ -197,11 +199,7 @@ void addSteps(CLI::App& command, ImportArguments& o)
             "--largest-component",
             [&o](const std::vector<std::string>& names) {
                 o.steps.largest = true;
-                for (const std::string& name : names) {
-                    if (!name.empty()) {
-                        o.steps.largestOf.push_back(name);
-                    }
-                }
+                std::ranges::remove_copy(names, std::back_inserter(o.steps.largestOf), "");
             },
             "Keep only the largest piece of every label, or of this one")
         ->expected(0, 1)

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <base/split.h>
@@ -64,14 +65,11 @@ nlohmann::json figures(const volume::Tissue& tissue, double seconds)
     const Index3 size = tissue.size();
     const Vec3 spacing = tissue.affine().spacing() * 1e3;
     const volume::MemoryUse memory = tissue.memory();
-    nlohmann::json labels = nlohmann::json::array();
-    for (const volume::Structure& s : tissue.structures()) {
-        labels.push_back({{"value", s.value},
-                          {"name", s.name},
-                          {"tissue", tissue.table().rows[s.tissue].name},
-                          {"voxels", s.voxels},
-                          {"volume_ml", s.volume * 1e6}});
-    }
+    const auto labels = base::mapped<nlohmann::json>(tissue.structures(), [&](const auto& s) -> nlohmann::json {
+        const std::string& name = tissue.table().rows[s.tissue].name;
+        return {
+            {"value", s.value}, {"name", s.name}, {"tissue", name}, {"voxels", s.voxels}, {"volume_ml", s.volume * 1e6}};
+    });
     return {{"size", {size.x, size.y, size.z}},
             {"spacing_mm", {spacing.x, spacing.y, spacing.z}},
             {"labels", labels},

@@ -42,10 +42,7 @@ std::string verdict(const PlanCandidate& c, bool chosen)
     if (!c.tried) {
         return c.holdsBudget ? "not tried: no cheaper than the choice" : "not tried: over the budget";
     }
-    if (!c.holdsError && !c.holdsBudget) {
-        return "over error and budget";
-    }
-    return c.holdsError ? "over the budget" : "over the error";
+    return c.holdsError ? "over the budget" : c.holdsBudget ? "over the error" : "over error and budget";
 }
 
 void printCandidates(const Plan& plan)

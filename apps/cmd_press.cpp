@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/mapped.h>
 #include <command/json.h>
 #include <command/options.h>
 
@@ -78,9 +79,8 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
     const bool needle = tool.kind == ToolKind::needle, other = tool.kind != scene.kind;
     base::failIf(tool.kind == ToolKind::sphere && o.length,
                  "--length-mm: the tool is a sphere, which has no length: leave it out");
-    if (!needle && scene.kind == ToolKind::needle && !o.radius) {
-        throw base::error("--tool {}: the tool of {} is a needle: add --radius-mm for this one", *o.tool, o.scene);
-    }
+    base::failIf(!needle && scene.kind == ToolKind::needle && !o.radius,
+                 "--tool {}: the tool of {} is a needle: add --radius-mm for this one", o.tool.value_or(""), o.scene);
     base::failIf(other && tool.kind == ToolKind::capsule && !o.length,
                  "--tool capsule: the tool of {} is a {}: add --length-mm for this one", o.scene, kindName(scene.kind));
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
@@ -144,11 +144,8 @@ json pressFigures(const PressArguments& o, const Run& run)
              {"tick_us", {{"p50", 1e6 * s.times.p50}, {"p99", 1e6 * s.times.p99}, {"max", 1e6 * s.times.max}}},
              {"peak_force_n", s.peakForce},
              {"held_from_s", s.heldFrom ? json(*s.heldFrom) : json()},
-             {"samples", json::array()},
+             {"samples", base::mapped<json>(run.samples, sampleFigures)},
              {"displacement", json::array()}};
-    for (const PressSample& sample : run.samples) {
-        out["samples"].push_back(sampleFigures(sample));
-    }
     for (std::size_t i = 0; i < run.points.size(); ++i) {
         out["displacement"].push_back(
             {{"at_mm", millimetres(run.points[i].at)}, {"by_mm", millimetres(run.samples.back().displacement[i])}});

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -130,9 +131,7 @@ report::ScoredGroup scored(const PeopleGroup& group)
 {
     report::ScoredGroup out{group.name, {}};
     for (const PersonProgress& p : group.people) {
-        for (const training::StoredSession& s : p.sessions) {
-            out.sessions.push_back(training::rowOf(s));
-        }
+        std::ranges::transform(p.sessions, std::back_inserter(out.sessions), training::rowOf);
     }
     base::failIf(out.sessions.empty(), "--group {}: these people have no such sessions", group.name);
     return out;
@@ -196,13 +195,10 @@ void run(const ProgressArguments& o)
     base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;
     const auto asked = base::mapped<std::string>(o.curricula, [&](const std::string& id) { return curricula.add(id); });
-    auto people = base::mapped<PersonProgress>(
-        o.names, [&](const std::string& name) { return progressOf(store, store.find(name), asked, curricula); });
-    if (o.all) {
-        for (const training::Person& person : store.people()) {
-            people.push_back(progressOf(store, person, asked, curricula));
-        }
-    }
+    const auto shown = o.all ? store.people()
+                             : base::mapped<training::Person>(o.names, [&](const auto& name) { return store.find(name); });
+    const auto people =
+        base::mapped<PersonProgress>(shown, [&](const auto& who) { return progressOf(store, who, asked, curricula); });
     const std::vector<PeopleGroup> grouped = groupsOf(o, store, curricula);
     const auto groups = base::mapped<report::ScoredGroup>(grouped, scored);
     base::failIf(people.empty() && groups.empty(),

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <command/json.h>
 
@@ -28,15 +29,13 @@ struct ReplayArguments {
 
 nlohmann::json differenceFigures(const haptics::ReplayResult& result)
 {
-    auto all = nlohmann::json::array();
-    for (const haptics::Difference& d : result.differences) {
-        all.push_back({{"what", d.what},
-                       {"first_tick", d.firstTick},
-                       {"ticks", d.ticks},
-                       {"recorded", d.recorded},
-                       {"recomputed", d.recomputed}});
-    }
-    return all;
+    return base::mapped<nlohmann::json>(result.differences, [](const haptics::Difference& d) {
+        return nlohmann::json{{"what", d.what},
+                              {"first_tick", d.firstTick},
+                              {"ticks", d.ticks},
+                              {"recorded", d.recorded},
+                              {"recomputed", d.recomputed}};
+    });
 }
 
 // What is wrong with the record, beside what its format and its build have to do with it; empty: nothing.

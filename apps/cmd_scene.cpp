@@ -60,14 +60,8 @@ void checkStructure(const volume::Tissue& tissue, const std::string& option, con
     if (!tissue.labelsNamed(name).empty()) {
         return;
     }
-    std::vector<std::string> names;
-    for (const volume::Structure& s : tissue.structures()) {
-        if (tissue.table().rows[s.tissue].role != volume::Role::air) {
-            names.push_back(s.name);
-        }
-    }
     throw base::error("{} {}: the volume has no structure or tissue of this name; it has {}", option, name,
-                      fmt::join(names, ", "));
+                      fmt::join(datasets::solidNames(tissue), ", "));
 }
 
 // The scene without a way in.
@@ -118,12 +112,8 @@ double needleLengthFor(const Scene& scene, const Proposal& way)
 {
     const double wanted =
         std::max(way.length, datasets::firingDepth(scene.tool, way.length) + scene.tool.throwLength) + handle;
-    for (const double length : needleLengths) {
-        if (length >= wanted) {
-            return length;
-        }
-    }
-    return needleLengths.back();
+    const auto longEnough = std::ranges::lower_bound(needleLengths, wanted);
+    return longEnough == needleLengths.end() ? needleLengths.back() : *longEnough;
 }
 
 // The volume's file as the scene should name it: relative where it lies beside or below the scene.
@@ -183,11 +173,9 @@ std::string crossingText(const Proposal& way)
 
 nlohmann::json crossingFigures(const Proposal& way)
 {
-    nlohmann::json out = nlohmann::json::array();
-    for (const datasets::Crossing& c : way.verdict.crossings) {
-        out.push_back({{"structure", c.structure}, {"mm", 1e3 * c.length}});
-    }
-    return out;
+    return base::mapped<nlohmann::json>(way.verdict.crossings, [](const datasets::Crossing& c) {
+        return nlohmann::json{{"structure", c.structure}, {"mm", 1e3 * c.length}};
+    });
 }
 
 // What is not safe to rely on, of the way that is written and of the volume.
@@ -243,10 +231,7 @@ void runScene(const SceneArguments& o)
 {
     base::checkNames({o.output});
     base::checkOutputs({o.output, o.json}, {o.volume});
-    std::optional<double> margin;
-    if (!o.margin.empty()) {
-        margin = base::lengthFrom("--margin", o.margin, 0, 6e-3);
-    }
+    const auto margin = o.margin.empty() ? std::nullopt : std::optional(base::lengthFrom("--margin", o.margin, 0, 6e-3));
     command::Progress progress;
     progress.show("loading the volume");
     volume::Tissue tissue = session::loadVolume(o.volume);

@@ -93,10 +93,8 @@ std::string sessionName(const TrainArguments& o)
 // A report is made from a record: without --record it lies beside the report.
 fs::path recordFile(const TrainArguments& o)
 {
-    if (!o.record.empty()) {
-        return o.record;
-    }
-    return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
+    const bool besideReport = o.record.empty() && !o.report.empty();
+    return besideReport ? fs::path(o.report).replace_extension(".db") : fs::path(o.record);
 }
 
 // Pictures of a record are those of its events, on a machine that is busy too, and no viewer is beside the servo loop.
@@ -344,10 +342,7 @@ void train(TrainArguments o)
     const auto record = recordFile(o);
     applyTask(o);
     training.change(o.changes);
-    std::shared_ptr<falcon::Driver> falcon;
-    if (o.device == "falcon") {
-        falcon = session::openFalcon(o.falcon);
-    }
+    const std::shared_ptr<falcon::Driver> falcon = o.device == "falcon" ? session::openFalcon(o.falcon) : nullptr;
     if (const auto arm = session::deviceKind(o.device).arm; !arm.empty()) {
         o.changes.arm = o.changes.arm.value_or(std::string(arm));
     }

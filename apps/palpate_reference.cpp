@@ -25,6 +25,7 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
+#include <ranges>
 #include <string>
 #include <vector>
 
@@ -160,13 +161,10 @@ json lookFigures(const reference::Solver& solver, const studies::ReferenceState&
 
 json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& table)
 {
-    json regions = json::array();
-    for (std::size_t r = 0; r < body.rows.size(); ++r) {
-        regions.push_back({{"tissue", table.rows[body.rows[r]].name},
-                           {"voxels_ml", 1e6 * body.voxels[r]},
-                           {"mesh_ml", 1e6 * body.volume[r]}});
-    }
-    return regions;
+    return base::mapped<json>(std::views::iota(0UL, body.rows.size()), [&](std::size_t r) -> json {
+        const std::string& name = table.rows[body.rows[r]].name;
+        return {{"tissue", name}, {"voxels_ml", 1e6 * body.voxels[r]}, {"mesh_ml", 1e6 * body.volume[r]}};
+    });
 }
 
 // TetGen fills the surfaces of CGAL's mesh, in a process of its own, and takes its points, which are as dense as they must
@@ -297,9 +295,7 @@ void run(const ReferenceArguments& o)
     const auto model = session::openSession(o.scene, changes);
     const auto place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     auto path = studies::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
-    if (!o.pathOf.empty()) {
-        path = studies::pressedBy(path, pressIn(o.pathOf, tool));
-    }
+    path = o.pathOf.empty() ? path : studies::pressedBy(path, pressIn(o.pathOf, tool));
     if (o.press > 0.0) {
         path.press = path.gap + 1e-3 * o.press;
     }

@@ -36,12 +36,8 @@ void addRows(const PersonProgress& p, const CurriculumProgress& c, const Exercis
     }
     const auto& last = e.chart.back();
     for (const std::string& key : training::measuresOf(*e.exercise)) {
-        std::vector<double> values;
-        for (const StoredSession& s : e.sessions) {
-            if (const double value = training::valueIn(s.values, key); !std::isnan(value)) {
-                values.push_back(value);
-            }
-        }
+        auto values = base::mapped<double>(e.sessions, [&](const auto& s) { return training::valueIn(s.values, key); });
+        std::erase_if(values, [](double value) { return std::isnan(value); });
         values.erase(values.begin(), values.end() - static_cast<std::ptrdiff_t>(std::min(values.size(), recent)));
         rows.push_back({{"name", p.person.name},
                         {"curriculum", c.curriculum->id},
@@ -63,25 +59,19 @@ void addRows(const PersonProgress& p, const CurriculumProgress& c, const Exercis
 
 json levelsOf(const training::Gate& gate)
 {
-    json levels = json::array();
-    for (const training::Level& level : gate.levels) {
-        levels.push_back({{"measure", level.measure},
-                          {"at_least", level.atLeast ? json(*level.atLeast) : json()},
-                          {"at_most", level.atMost ? json(*level.atMost) : json()}});
-    }
-    return levels;
+    return base::mapped<json>(gate.levels, [](const training::Level& level) {
+        return json{{"measure", level.measure},
+                    {"at_least", level.atLeast ? json(*level.atLeast) : json()},
+                    {"at_most", level.atMost ? json(*level.atMost) : json()}};
+    });
 }
 
 // Where somebody stands in an exercise, and the charts of it; also of one that was not begun.
 json standing(const PersonProgress& p, const CurriculumProgress& c, const ExerciseProgress& e, bool next)
 {
-    json curves = json::object(), alarm = json::array(), learning = json::array();
+    json curves = json::object();
     for (const std::string& key : training::measuresOf(*e.exercise)) {
         curves[key] = curveOf(e, key);
-    }
-    for (const training::CusumPoint& point : e.chart) {
-        alarm.push_back(point.alarm);
-        learning.push_back(point.learning);
     }
     const training::CusumPlan& plan = c.curriculum->cusum;
     return {{"name", p.person.name},
@@ -109,8 +99,8 @@ json standing(const PersonProgress& p, const CurriculumProgress& c, const Exerci
             {"cusum",
              {{"p0", plan.p0},
               {"p1", plan.p1},
-              {"alarm", alarm},
-              {"learning", learning},
+              {"alarm", base::mapped<json>(e.chart, &training::CusumPoint::alarm)},
+              {"learning", base::mapped<json>(e.chart, &training::CusumPoint::learning)},
               {"alarm_limit", plan.alarmLimit()},
               {"learning_limit", plan.learningLimit()}}}};
 }

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <ranges>
 #include <set>
 #include <utility>
 #include <vector>
@@ -219,11 +220,9 @@ public:
     }
     std::vector<Vec3> displacements() const
     {
-        std::vector<Vec3> out;
-        for (std::size_t p = 0; p < push_.points.size(); ++p) {
-            out.push_back(vectorOf(body_->m_nodes[static_cast<int>(p)].m_x) / perMetre - push_.points[p]);
-        }
-        return out;
+        return base::mapped<Vec3>(std::views::iota(0UL, push_.points.size()), [&](std::size_t p) {
+            return vectorOf(body_->m_nodes[static_cast<int>(p)].m_x) / perMetre - push_.points[p];
+        });
     }
 
 private:

@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
 
@@ -56,9 +57,7 @@ reference::TetMesh meshOf(const RivalPush& push)
     reference::TetMesh mesh;
     mesh.points = push.points;
     mesh.tets = push.tets;
-    for (const std::uint32_t m : push.material) {
-        mesh.tissue.push_back(static_cast<std::uint8_t>(m));
-    }
+    mesh.tissue = base::mapped<std::uint8_t>(push.material, std::identity());
     addFaces(push, mesh);
     return mesh;
 }
@@ -69,10 +68,9 @@ RivalResults solve(const RivalPush& push, const std::filesystem::path& folder)
     const auto materials = base::mapped<reference::Material>(push.materials, [&](const RivalMaterial& m) {
         return reference::Material{m.youngsModulus, m.poisson, 0.0};
     });
-    reference::CcxPress press{push.held, push.radius, push.centre.at(0), {}};
-    for (const std::size_t look : push.looks) {
-        press.centres.push_back(push.centre.at(look));
-    }
+
+    const auto centreAt = [&](std::size_t look) { return push.centre.at(look); };
+    const reference::CcxPress press{push.held, push.radius, push.centre.at(0), base::mapped<Vec3>(push.looks, centreAt)};
     const auto file = folder / "press.inp";
     reference::exportCcxPress(meshOf(push), materials, press, file);
     const double before = childrensTime();

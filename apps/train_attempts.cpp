@@ -1,12 +1,12 @@
 #include <apps/train_attempts.h>
 
+#include <base/inputs.h>
 #include <base/utc.h>
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
-#include <set>
-#include <system_error>
 
 namespace palpate::apps {
 
@@ -15,26 +15,19 @@ namespace fs = std::filesystem;
 namespace {
 
 // The ultrasound pictures that are stored beside a record.
-std::set<fs::path> picturesOf(const fs::path& record)
+std::vector<fs::path> picturesOf(const fs::path& record)
 {
-    std::set<fs::path> pictures;
-    std::error_code none;  // no folder, no pictures
-    for (const auto& one : fs::directory_iterator(fs::path(record).replace_extension(".ultrasound"), none)) {
-        if (one.path().extension() == ".png") {
-            pictures.insert(one.path());
-        }
-    }
-    return pictures;
+    return base::filesWith(".png", fs::path(record).replace_extension(".ultrasound"));
 }
 
 // @param before  pictures that were there when it began
-void forget(const fs::path& record, const std::set<fs::path>& before)
+void forget(const fs::path& record, const std::vector<fs::path>& before)
 {
     for (const char* part : {"", "-wal", "-shm", "-journal"}) {
         fs::remove(record.string() + part);
     }
     for (const fs::path& picture : picturesOf(record)) {
-        if (!before.contains(picture)) {
+        if (!std::ranges::binary_search(before, picture)) {
             fs::remove(picture);
         }
     }
@@ -45,7 +38,7 @@ void forget(const fs::path& record, const std::set<fs::path>& before)
 session::TrainResult runToItsEnd(const haptics::SessionModel& model, haptics::SessionInfo& info,
                                  const session::TrainOptions& options)
 {
-    const auto before = options.record.empty() ? std::set<fs::path>() : picturesOf(options.record);
+    const auto before = options.record.empty() ? std::vector<fs::path>() : picturesOf(options.record);
     for (;;) {
         session::TrainResult result = session::Trainer(model, info, options).run();
         if (!result.restart || result.signal != 0 || !result.problem.empty()) {

@@ -19,8 +19,7 @@ public:
     /// The same with streams of its own; the program always gets a group of its own.
     /// @pre  at least one word
     ChildProcess(Program program, const std::string& remedy);
-    ChildProcess(const ChildProcess&) = delete;
-    ChildProcess& operator=(const ChildProcess&) = delete;
+    ChildProcess& operator=(ChildProcess&&) = delete;
     /// Asks it and what it has started to end (SIGTERM) if it still runs, and after two seconds no longer asks (SIGKILL).
     ~ChildProcess();
 

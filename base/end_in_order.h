@@ -14,8 +14,7 @@ class EndInOrder {
 public:
     EndInOrder();
     ~EndInOrder();
-    EndInOrder(const EndInOrder&) = delete;
-    EndInOrder& operator=(const EndInOrder&) = delete;
+    EndInOrder& operator=(EndInOrder&&) = delete;
 
     /// Whether the end was asked for. The program may ask for it, too.
     static std::atomic<bool>& asked() noexcept;

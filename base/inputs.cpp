@@ -1,5 +1,10 @@
 #include <base/inputs.h>
 
+#include <base/error.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <system_error>
 
 namespace palpate::base {
@@ -31,6 +36,26 @@ std::string whyNoFile(const std::filesystem::path& file)
     return std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))
                ? "is a symbolic link to a file that is not there: check where it leads"
                : "there is no such file: check the name";
+}
+
+std::vector<std::filesystem::path> filesWith(const std::string& ending, const std::filesystem::path& folder)
+{
+    std::error_code none;
+    std::vector<std::filesystem::path> files;
+    std::ranges::copy_if(std::filesystem::directory_iterator(folder, none), std::back_inserter(files),
+                         [&](const std::filesystem::path& file) { return file.extension() == ending; });
+    std::ranges::sort(files);
+    return files;
+}
+
+void checkTable(const std::filesystem::path& file, const char* kind)
+{
+    constexpr std::uintmax_t largest = 16U << 20U;
+    const std::string why = whyNoFile(file);
+    failIf(!why.empty(), "{}: {}", file.native(), why);
+    std::error_code error;
+    const auto size = std::filesystem::file_size(file, error);
+    failIf(error || size > largest, "{}: over 16 MB, too large for {}: is it a volume?", file.native(), kind);
 }
 
 std::string inWords(const std::filesystem::filesystem_error& error)

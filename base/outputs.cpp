@@ -29,6 +29,28 @@ void refuseCircle(const fs::path& file)
     }
 }
 
+// Whether both names lead to one file. Not for what takes bytes from everybody: a device, standard output.
+bool areOneFile(const fs::path& a, const fs::path& b)
+{
+    if (a.empty() || b.empty() || a == "-" || b == "-") {
+        return false;
+    }
+    std::error_code none;
+    if (fs::exists(a, none) && fs::exists(b, none)) {
+        return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
+    }
+    const fs::path there = fs::weakly_canonical(fs::absolute(a), none);
+    return !fs::exists(a, none) && there == fs::weakly_canonical(fs::absolute(b), none);
+}
+
+// A device or a pipe: it takes what is written and is no place for another file.
+bool takesBytes(const fs::path& file)
+{
+    std::error_code none;
+    const fs::file_status status = fs::status(file, none);
+    return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
 }  // namespace
 
 void checkOutput(const fs::path& file)
@@ -47,24 +69,6 @@ void checkOutput(const fs::path& file)
         throw base::error("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno));
     }
 }
-
-namespace {
-
-// Whether both names lead to one file. Not for what takes bytes from everybody: a device, standard output.
-bool areOneFile(const fs::path& a, const fs::path& b)
-{
-    if (a.empty() || b.empty() || a == "-" || b == "-") {
-        return false;
-    }
-    std::error_code none;
-    if (fs::exists(a, none) && fs::exists(b, none)) {
-        return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
-    }
-    const fs::path there = fs::weakly_canonical(fs::absolute(a), none);
-    return !fs::exists(a, none) && there == fs::weakly_canonical(fs::absolute(b), none);
-}
-
-}  // namespace
 
 void checkNames(const std::vector<fs::path>& outputs)
 {
@@ -109,18 +113,6 @@ bool makeFolders(const fs::path& folder)
                  failed.message());
     return made;
 }
-
-namespace {
-
-// A device or a pipe: it takes what is written and is no place for another file.
-bool takesBytes(const fs::path& file)
-{
-    std::error_code none;
-    const fs::file_status status = fs::status(file, none);
-    return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
-}
-
-}  // namespace
 
 fs::path replaceable(const fs::path& file)
 {

@@ -88,10 +88,7 @@ std::string tr(const std::string& text)
 
 const char* trn(const char* one, const char* many, unsigned long count) noexcept
 {
-    if (isEnglish) {
-        return count == 1 ? one : many;
-    }
-    return ::dngettext(domain, one, many, count);
+    return isEnglish ? (count == 1 ? one : many) : ::dngettext(domain, one, many, count);
 }
 
 const char* nameOfCore(std::string_view judged) noexcept

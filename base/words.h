@@ -27,8 +27,7 @@ class English {
 public:
     English() noexcept;
     ~English();
-    English(const English&) = delete;
-    English& operator=(const English&) = delete;
+    English& operator=(English&&) = delete;
 
 private:
     bool before_;

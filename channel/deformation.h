@@ -41,8 +41,7 @@ public:
     /// `labels`: tissue row per display voxel, 0 = air, with shellBit; copied.
     Deformation(const Scenery& scenery, std::span<const std::uint8_t> labels);
 
-    Deformation(const Deformation&) = delete;
-    Deformation& operator=(const Deformation&) = delete;
+    Deformation& operator=(Deformation&&) = delete;
 
     /// Takes over the nodes of one moment. Returns the display voxels that look different from before.
     VoxelBox apply(const Displaced& displaced);

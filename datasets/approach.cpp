@@ -1,8 +1,10 @@
 #include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/approach.h>
 #include <datasets/voxel_obstacles.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
@@ -48,11 +50,9 @@ Labels namedLabels(const Scene& scene, const Tissue& tissue)
 {
     Labels labels = tissue.labelsNamed(scene.target);
     if (labels.empty()) {
-        std::string names;
-        for (const Structure& s : tissue.structures()) {
-            names += (names.empty() ? "" : ", ") + s.name;
-        }
-        throw base::error("{}: no structure '{}' in the volume; there are {}", scene.name, scene.target, names);
+        const auto names = base::mapped<std::string>(tissue.structures(), &Structure::name);
+        throw base::error("{}: no structure '{}' in the volume; there are {}", scene.name, scene.target,
+                          fmt::join(names, ", "));
     }
     return labels;
 }
@@ -193,12 +193,8 @@ bool outside(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
 bool nearBorder(const Tissue& tissue, Vec3 p)
 {
     const Vec3 index = tissue.affine().toIndex(p);
-    for (int axis = 0; axis < 3; ++axis) {
-        if (index[axis] < borderVoxels || index[axis] > tissue.size()[axis] - 1 - borderVoxels) {
-            return true;
-        }
-    }
-    return false;
+    const Index3 farthest = tissue.size() - 1 - borderVoxels;
+    return glm::any(glm::lessThan(index, Vec3(borderVoxels))) || glm::any(glm::greaterThan(index, Vec3(farthest)));
 }
 
 // Where the way from `aim` along `direction` leaves the body for good, or nothing when that is no place to enter.
@@ -342,38 +338,6 @@ bool differ(const Proposal& a, const Proposal& b)
     return glm::dot(da, db) < otherDirection || glm::length(a.approach.aim - b.approach.aim) > otherPlace;
 }
 
-}  // namespace
-
-Approach planApproach(const Scene& scene, const Tissue& tissue)
-{
-    if (scene.entry) {
-        return {*scene.entry, aims(scene, tissue).front()};
-    }
-    return goodLines(scene, tissue, std::nullopt).front().way.approach;
-}
-
-std::vector<Proposal> proposeApproaches(const Scene& scene, const Tissue& tissue, std::size_t most,
-                                        std::optional<double> margin)
-{
-    std::vector<Proposal> out;
-    for (const Line& line : goodLines(scene, tissue, margin)) {
-        const bool isNew = std::all_of(out.begin(), out.end(), [&](const Proposal& p) { return differ(p, line.way); });
-        if (isNew && out.size() < most) {
-            out.push_back(line.way);
-        }
-    }
-    return out;
-}
-
-// The tip then stands half a notch beyond the aim. A shallow aim is missed rather than fired at from outside.
-double firingDepth(const ToolSpec& tool, double length) noexcept
-{
-    const double depth = length + halfNotch(tool) - throwOf(tool);
-    return tool.kind == ToolKind::needle ? std::max(minInside, depth) : depth;
-}
-
-namespace {
-
 constexpr double touchDepth = 1.5e-3;  // that a touch pushes the skin in: a needle pierces it at some millimetres [m]
 constexpr double restTime = 3.5;       // three seconds, counted slowly [s]
 
@@ -412,6 +376,34 @@ std::vector<TraineeStep> stepsInside(const Scene& scene, const Approach& approac
 
 }  // namespace
 
+Approach planApproach(const Scene& scene, const Tissue& tissue)
+{
+    if (scene.entry) {
+        return {*scene.entry, aims(scene, tissue).front()};
+    }
+    return goodLines(scene, tissue, std::nullopt).front().way.approach;
+}
+
+std::vector<Proposal> proposeApproaches(const Scene& scene, const Tissue& tissue, std::size_t most,
+                                        std::optional<double> margin)
+{
+    std::vector<Proposal> out;
+    for (const Line& line : goodLines(scene, tissue, margin)) {
+        const bool isNew = std::all_of(out.begin(), out.end(), [&](const Proposal& p) { return differ(p, line.way); });
+        if (isNew && out.size() < most) {
+            out.push_back(line.way);
+        }
+    }
+    return out;
+}
+
+// The tip then stands half a notch beyond the aim. A shallow aim is missed rather than fired at from outside.
+double firingDepth(const ToolSpec& tool, double length) noexcept
+{
+    const double depth = length + halfNotch(tool) - throwOf(tool);
+    return tool.kind == ToolKind::needle ? std::max(minInside, depth) : depth;
+}
+
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach)
 {
     if (!scene.script.empty()) {
@@ -424,9 +416,7 @@ std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& appro
     std::vector<TraineeStep> script{
         {.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 4, .tolerance = 1e-3},
         {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.04, .seconds = 4, .tolerance = 1e-3}};
-    for (const TraineeStep& step : stepsInside(scene, approach, length, inward)) {
-        script.push_back(step);
-    }
+    std::ranges::move(stepsInside(scene, approach, length, inward), std::back_inserter(script));
     script.push_back({.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 10, .tolerance = 2e-3});
     return script;
 }

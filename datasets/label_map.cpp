@@ -35,9 +35,8 @@ LabelMap readMap(Section& top, const std::string& fallbackName)
         const auto value = section.integer("value", "", 0, 65535);
         const auto name = section.word("name");
         const auto tissue = section.word("tissue");
-        if (!tissue || (!value && !name)) {
-            section.missing(tissue ? "value" : "tissue", "each label has a tissue, and a value or a name or both");
-        }
+        section.missingIf(!tissue || (!value && !name), tissue ? "value" : "tissue",
+                          "each label has a tissue, and a value or a name or both");
         section.finish();
         if (!value) {
             map.segments.emplace_back(*name, *tissue);
@@ -71,9 +70,7 @@ std::vector<LabelMap> readBuiltIn()
         const std::string file = "built-in " + name + ".toml";
         const toml::table root = parseToml(embeddedFile("tables/" + name + ".toml"), file);
         Section top(root, file, "");
-        for (Section& section : top.sections("map")) {
-            maps.push_back(readMap(section, name));
-        }
+        maps = base::mapped<LabelMap>(top.sections("map"), [&](Section& section) { return readMap(section, name); });
         top.finish();
     }
     return maps;
@@ -112,17 +109,11 @@ std::vector<std::pair<double, double>> pointsOf(Section& top)
         const auto value = pair != nullptr && pair->size() == 2 ? pair->get(0)->value<double>() : std::nullopt;
         const auto factor = pair != nullptr && pair->size() == 2 ? pair->get(1)->value<double>() : std::nullopt;
         const bool grows = value && std::abs(*value) <= farthestValue && (points.empty() || *value > points.back().first);
-        if (!grows || !factor || !(*factor >= 1 / maxFactor && *factor <= maxFactor)) {
-            top.refuse("points", form);
-        }
+        top.refuseIf(!grows || !factor || !(*factor >= 1 / maxFactor && *factor <= maxFactor), "points", form);
         points.emplace_back(*value, *factor);
     }
-    if (points.empty() && node != nullptr) {
-        top.refuse("points", form);
-    }
-    if (points.empty()) {
-        top.missing("points", form);
-    }
+    top.refuseIf(points.empty() && node != nullptr, "points", form);
+    top.missingIf(points.empty(), "points", form);
     return points;
 }
 
@@ -157,10 +148,8 @@ std::vector<std::string> labelMapNames()
 LabelMap labelMap(const std::string& nameOrFile)
 {
     const std::string name = nameOrFile == "destrieux" ? "freesurfer" : nameOrFile;
-    for (const LabelMap& map : labelMaps()) {
-        if (map.name == name) {
-            return map;
-        }
+    if (const auto known = std::ranges::find(labelMaps(), name, &LabelMap::name); known != labelMaps().end()) {
+        return *known;
     }
     if (const std::string why = base::whyNoFile(nameOrFile); !why.empty()) {
         const std::vector<std::string> names = labelMapNames();
@@ -251,10 +240,9 @@ std::optional<std::string> StructureNames::tissueOf(std::string_view name) const
         return std::nullopt;
     }
     for (const auto* known : {&phrases_, &labels_}) {
-        for (const auto& [phrase, tissue] : *known) {
-            if (!words.empty() && words == phrase) {
-                return tissue;
-            }
+        const auto found = std::ranges::find(*known, words, [](const auto& entry) { return entry.first; });
+        if (!words.empty() && found != known->end()) {
+            return found->second;
         }
     }
     return std::nullopt;
@@ -294,9 +282,8 @@ volume::StiffnessMap stiffnessMap(const std::string& nameOrFile, const std::stri
         top.refuseIf(map.tissues.empty(), "tissues", "must be a list of tissues: [\"fat\", \"gland\"]");
     }
     for (const std::string& tissue : map.tissues) {
-        if (!table.find(tissue)) {
-            top.refuse("tissues", fmt::format("'{}' is not in the tissue table '{}'", tissue, table.name));
-        }
+        top.refuseIf(!table.find(tissue), "tissues",
+                     fmt::format("'{}' is not in the tissue table '{}'", tissue, table.name));
     }
     top.finish();
     return map;

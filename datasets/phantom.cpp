@@ -29,10 +29,8 @@ constexpr double smallestVoxel = 0.1, largestVoxel = 5;  // [mm]
 
 const Maker& makerOf(const std::string& name)
 {
-    for (const Maker& maker : makers) {
-        if (name == maker.name) {
-            return maker;
-        }
+    if (const auto maker = std::ranges::find(makers, name, &Maker::name); maker != std::end(makers)) {
+        return *maker;
     }
     throw base::error("phantom '{}': there is none; there are {}", name, fmt::join(phantomNames(), ", "));
 }
@@ -91,9 +89,7 @@ volume::Provenance provenance(const PhantomSpec& spec, const PhantomValues& valu
     for (const auto& [name, value] : values.numbers) {
         out.emplace_back(name, fmt::format("{:.12g}", value));
     }
-    for (const auto& [name, value] : values.words) {
-        out.emplace_back(name, value);
-    }
+    out.insert(out.end(), values.words.begin(), values.words.end());
     return out;
 }
 

@@ -29,84 +29,6 @@ double norm(Vec3 v) noexcept
     return std::sqrt(glm::dot(v, v));
 }
 
-}  // namespace
-
-BreastInterior::BreastInterior(const BreastShape& shape, double density) : shape_(shape)
-{
-    Random random(shape.seed + 21);
-    const int count = 11 + static_cast<int>(random.bits() % 5U);
-    while (static_cast<int>(lobes_.size()) < count) {
-        const double x = random.between(-1, 1), z = random.between(-1, 1);
-        const double length = std::sqrt(x * x + z * z);
-        if (length > 0.2 && length <= 1) {
-            lobes_.emplace_back(x / length, 0, z / length);
-        }
-    }
-    // The threshold is a quantile of the score over a fixed 3 mm sampling: it does not depend on the voxels.
-    std::vector<double> scores;
-    const auto sample = [&](double x, double z) {
-        const SurfaceColumn column = surfaceColumn(shape, x, z);
-        for (double y = column.skinFront + 1; y < column.muscleFront; y += 3) {
-            if (column.depth(y) > shape.skin) {
-                scores.push_back(glandScore({x, y, z}, column));
-            }
-        }
-    };
-    for (double z = -shape.radius; z < shape.radius; z += 3) {
-        for (double x = -shape.radius; x < shape.radius; x += 3) {
-            if (x * x + z * z <= shape.radius * shape.radius) {
-                sample(x, z);
-            }
-        }
-    }
-    const double rank = (1.0 - density) * static_cast<double>(scores.size() - 1);
-    const auto nth = scores.begin() + static_cast<std::ptrdiff_t>(rank);
-    std::nth_element(scores.begin(), nth, scores.end());
-    threshold_ = *nth;
-}
-
-// How much a point belongs to the gland: inside an envelope under the skin and in front of the muscle, in lobes that run
-// from the nipple, ragged by noise. The gland reaches up to the nipple and thins out towards the breast's foot.
-double BreastInterior::glandScore(Vec3 p, const SurfaceColumn& column) const noexcept
-{
-    const Vec3 fromApex = p - shape_.apex;
-    const double side = std::sqrt(fromApex.x * fromApex.x + fromApex.z * fromApex.z);
-    const double under = subcutaneous * std::min(1.0, 0.15 + side / 22);
-    const double envelope = std::min(column.depth(p.y) - under, column.muscleFront - p.y - retromammary);
-    if (envelope < -6) {
-        return -10;  // far outside; spares the noise
-    }
-    double best = -1, second = -1;
-    if (side > 1e-6) {
-        const Vec3 warped = warp(shape_.seed + 40, fromApex, 18, 4);
-        const double length = std::sqrt(warped.x * warped.x + warped.z * warped.z) + 1e-6;
-        for (const Vec3& lobe : lobes_) {
-            const double along = (lobe.x * warped.x + lobe.z * warped.z) / length;
-            second = std::max(second, std::min(best, along));
-            best = std::max(best, along);
-        }
-    }
-    // Clefts of fat between the lobes widen with the distance from the nipple.
-    const double cleft = std::min(1.0, (best - second) * side / 5.0) * std::min(1.0, side / 15);
-    const double coarse = smoothNoise(shape_.seed + 50, p / 13.0);
-    const double fine = smoothNoise(shape_.seed + 51, p / 5.5);
-    const double far = norm(fromApex) / shape_.radius;
-    return std::min(0.9, envelope / 7) + 0.7 * cleft + 1.1 * coarse + 0.6 * fine - 0.7 * far * far;
-}
-
-// Sheets between lobules of fat: where two cells of a warped Worley pattern meet. Holes come from a mask of noise.
-bool BreastInterior::ligament(Vec3 p, const SurfaceColumn& column) const noexcept
-{
-    const double fade = std::min(1.0, column.depth(p.y) / 6);
-    if (smoothNoise(shape_.seed + 60, p / 12.0) > 0.25 + 0.2 * fade) {
-        return false;
-    }
-    const Vec3 q = warp(shape_.seed + 70, p, 14, 4) / lobule;
-    return cellWallDistance(shape_.seed + 61, q) * lobule < sheet / 2;
-}
-
-namespace {
-
 // The skin's surface around a point, for exact depths [mm].
 std::vector<Vec3> skinPatch(const BreastShape& shape, Vec3 around, double reach)
 {
@@ -187,43 +109,6 @@ bool place(const BreastShape& shape, Lump& lump, double depth, const std::vector
     return fits(shape, lump, others);
 }
 
-}  // namespace
-
-std::vector<Lump> placeTumours(const BreastShape& shape, const PhantomValues& values)
-{
-    // The first ones can stand in the way of the last: begin again a few times.
-    constexpr int rounds = 12, attempts = 100;
-    Random random(shape.seed + 80);
-    const double depth = values.number("tumour_depth_mm");
-    const double diameter = values.number("tumour_diameter_mm");
-    const auto wanted = static_cast<std::size_t>(values.number("tumours"));
-    for (int round = 0; round < rounds; ++round) {
-        std::vector<Lump> tumours;
-        bool room = true;
-        while (room && tumours.size() < wanted) {
-            Lump lump = makeLump(values.word("tumour_kind"), diameter, random);
-            // The first lies as deep as asked, the others up to so deep.
-            const double top = tumours.empty() ? depth : random.between(std::min(depth, std::max(4.0, depth / 3)), depth);
-            room = false;
-            for (int attempt = 0; attempt < attempts && !room; ++attempt) {
-                room = place(shape, lump, top, tumours, random);
-            }
-            if (room) {
-                tumours.push_back(std::move(lump));
-            }
-        }
-        if (room) {
-            return tumours;
-        }
-    }
-    throw base::error(
-        "phantom 'breast': {:d} of tumour_diameter_mm = {:g} mm, tumour_depth_mm = {:g} mm find no room in a breast of "
-        "radius_mm = {:g} mm: make them smaller, less deep or fewer, or the breast larger",
-        wanted, diameter, depth, shape.radius);
-}
-
-namespace {
-
 using Allowed = std::function<bool(Vec3, double)>;
 
 std::vector<Tube> growVessel(const BreastShape& shape, Vec3 foot, Random& random, const Allowed& clear, const char* name)
@@ -258,6 +143,113 @@ std::vector<Tube> growVessel(const BreastShape& shape, Vec3 foot, Random& random
 }
 
 }  // namespace
+
+BreastInterior::BreastInterior(const BreastShape& shape, double density) : shape_(shape)
+{
+    Random random(shape.seed + 21);
+    const int count = 11 + static_cast<int>(random.bits() % 5U);
+    while (static_cast<int>(lobes_.size()) < count) {
+        const double x = random.between(-1, 1), z = random.between(-1, 1);
+        const double length = std::sqrt(x * x + z * z);
+        if (length > 0.2 && length <= 1) {
+            lobes_.emplace_back(x / length, 0, z / length);
+        }
+    }
+    // The threshold is a quantile of the score over a fixed 3 mm sampling: it does not depend on the voxels.
+    std::vector<double> scores;
+    const auto sample = [&](double x, double z) {
+        const SurfaceColumn column = surfaceColumn(shape, x, z);
+        for (double y = column.skinFront + 1; y < column.muscleFront; y += 3) {
+            if (column.depth(y) > shape.skin) {
+                scores.push_back(glandScore({x, y, z}, column));
+            }
+        }
+    };
+    for (double z = -shape.radius; z < shape.radius; z += 3) {
+        for (double x = -shape.radius; x < shape.radius; x += 3) {
+            if (x * x + z * z <= shape.radius * shape.radius) {
+                sample(x, z);
+            }
+        }
+    }
+    const double rank = (1.0 - density) * static_cast<double>(scores.size() - 1);
+    const auto nth = scores.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(scores.begin(), nth, scores.end());
+    threshold_ = *nth;
+}
+
+// How much a point belongs to the gland: inside an envelope under the skin and in front of the muscle, in lobes that run
+// from the nipple, ragged by noise. The gland reaches up to the nipple and thins out towards the breast's foot.
+double BreastInterior::glandScore(Vec3 p, const SurfaceColumn& column) const noexcept
+{
+    const Vec3 fromApex = p - shape_.apex;
+    const double side = std::sqrt(fromApex.x * fromApex.x + fromApex.z * fromApex.z);
+    const double under = subcutaneous * std::min(1.0, 0.15 + side / 22);
+    const double envelope = std::min(column.depth(p.y) - under, column.muscleFront - p.y - retromammary);
+    if (envelope < -6) {
+        return -10;  // far outside; spares the noise
+    }
+    double best = -1, second = -1;
+    if (side > 1e-6) {
+        const Vec3 warped = warp(shape_.seed + 40, fromApex, 18, 4);
+        const double length = std::sqrt(warped.x * warped.x + warped.z * warped.z) + 1e-6;
+        for (const Vec3& lobe : lobes_) {
+            const double along = (lobe.x * warped.x + lobe.z * warped.z) / length;
+            second = std::max(second, std::min(best, along));
+            best = std::max(best, along);
+        }
+    }
+    // Clefts of fat between the lobes widen with the distance from the nipple.
+    const double cleft = std::min(1.0, (best - second) * side / 5.0) * std::min(1.0, side / 15);
+    const double coarse = smoothNoise(shape_.seed + 50, p / 13.0);
+    const double fine = smoothNoise(shape_.seed + 51, p / 5.5);
+    const double far = norm(fromApex) / shape_.radius;
+    return std::min(0.9, envelope / 7) + 0.7 * cleft + 1.1 * coarse + 0.6 * fine - 0.7 * far * far;
+}
+
+// Sheets between lobules of fat: where two cells of a warped Worley pattern meet. Holes come from a mask of noise.
+bool BreastInterior::ligament(Vec3 p, const SurfaceColumn& column) const noexcept
+{
+    const double fade = std::min(1.0, column.depth(p.y) / 6);
+    if (smoothNoise(shape_.seed + 60, p / 12.0) > 0.25 + 0.2 * fade) {
+        return false;
+    }
+    const Vec3 q = warp(shape_.seed + 70, p, 14, 4) / lobule;
+    return cellWallDistance(shape_.seed + 61, q) * lobule < sheet / 2;
+}
+
+std::vector<Lump> placeTumours(const BreastShape& shape, const PhantomValues& values)
+{
+    // The first ones can stand in the way of the last: begin again a few times.
+    constexpr int rounds = 12, attempts = 100;
+    Random random(shape.seed + 80);
+    const double depth = values.number("tumour_depth_mm");
+    const double diameter = values.number("tumour_diameter_mm");
+    const auto wanted = static_cast<std::size_t>(values.number("tumours"));
+    for (int round = 0; round < rounds; ++round) {
+        std::vector<Lump> tumours;
+        bool room = true;
+        while (room && tumours.size() < wanted) {
+            Lump lump = makeLump(values.word("tumour_kind"), diameter, random);
+            // The first lies as deep as asked, the others up to so deep.
+            const double top = tumours.empty() ? depth : random.between(std::min(depth, std::max(4.0, depth / 3)), depth);
+            room = false;
+            for (int attempt = 0; attempt < attempts && !room; ++attempt) {
+                room = place(shape, lump, top, tumours, random);
+            }
+            if (room) {
+                tumours.push_back(std::move(lump));
+            }
+        }
+        if (room) {
+            return tumours;
+        }
+    }
+    throw base::error(
+        "phantom 'breast': {:d} of tumour_diameter_mm = {:g} mm, tumour_depth_mm = {:g} mm find no room in a breast of "
+        "radius_mm = {:g} mm: make them smaller, less deep or fewer, or the breast larger",
+        wanted, diameter, depth, shape.radius);
+}
 
 BreastTrees growBreastTrees(const BreastShape& shape, const BreastInterior& interior, const std::vector<Lump>& tumours,
                             bool vessels)

@@ -111,6 +111,25 @@ std::vector<Vec3> directions(int count)
     return out;
 }
 
+struct Branch {
+    Vec3 at{0.0}, direction{0.0};
+    double radius = 0, length = 0;
+    int level = 0;
+};
+
+// A unit vector across `direction`.
+Vec3 across(Vec3 direction, Random& random)
+{
+    for (;;) {
+        const Vec3 r = random.direction();
+        const Vec3 side = r - glm::dot(r, direction) * direction;
+        const double length2 = glm::dot(side, side);
+        if (length2 > 0.05) {
+            return side / std::sqrt(length2);
+        }
+    }
+}
+
 }  // namespace
 
 double Lump::reach(Vec3 direction) const noexcept
@@ -184,29 +203,6 @@ double distanceToTube(Vec3 p, const Tube& tube) noexcept
     const Vec3 d = p - (tube.from + t * along);
     return std::sqrt(glm::dot(d, d)) - (tube.fromRadius + t * (tube.toRadius - tube.fromRadius));
 }
-
-namespace {
-
-struct Branch {
-    Vec3 at{0.0}, direction{0.0};
-    double radius = 0, length = 0;
-    int level = 0;
-};
-
-// A unit vector across `direction`.
-Vec3 across(Vec3 direction, Random& random)
-{
-    for (;;) {
-        const Vec3 r = random.direction();
-        const Vec3 side = r - glm::dot(r, direction) * direction;
-        const double length2 = glm::dot(side, side);
-        if (length2 > 0.05) {
-            return side / std::sqrt(length2);
-        }
-    }
-}
-
-}  // namespace
 
 std::vector<Tube> growTree(const TreeShape& shape, Vec3 root, Vec3 direction, Vec3 goal, Random& random,
                            const std::function<bool(Vec3, double)>& allowed)

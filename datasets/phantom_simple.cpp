@@ -33,12 +33,8 @@ void requireRoom(bool room, const char* phantom, const PhantomValues& values)
 template <std::size_t N>
 std::uint16_t layerAt(const std::array<Layer, N>& layers, double depth)
 {
-    for (const Layer& layer : layers) {
-        if (depth < layer.depth) {
-            return layer.label;
-        }
-    }
-    return layers.back().label;
+    const auto layer = std::ranges::upper_bound(layers, depth, {}, &Layer::depth);
+    return layer == layers.end() ? layers.back().label : layer->label;
 }
 
 }  // namespace

@@ -188,6 +188,8 @@ std::optional<Scene> builtInScene(const std::string& name);
 std::string lesionOf(const volume::Tissue& tissue);
 /// The structure of largest volume that is not air; "" where there is none.
 std::string largestStructure(const volume::Tissue& tissue);
+/// The names of all structures that are not air.
+std::vector<std::string> solidNames(const volume::Tissue& tissue);
 /// The scene for a volume file alone: target = lesionOf(), vital = all of role vital. Throws std::runtime_error where there
 /// is no lesion and no target is named.
 Scene sceneForVolume(const std::filesystem::path& file, const volume::Tissue& tissue, const std::string& target = {});

@@ -41,9 +41,7 @@ constexpr std::array<Field<ProbeStep>, 7> probeStepFields{{
 Vec3 readDirection(Section& section, std::string_view key)
 {
     const auto direction = section.direction(key, farthestCoordinate);
-    if (!direction) {
-        section.missing(key, "a direction [x, y, z] in the patient frame LPS");
-    }
+    section.missingIf(!direction, key, "a direction [x, y, z] in the patient frame LPS");
     return *direction;
 }
 
@@ -55,9 +53,7 @@ std::string triple(Vec3 v)
 void readPlace(Section& section, ProbeSpec& probe)
 {
     const auto face = section.point("face_mm", farthestCoordinate);
-    if (!face) {
-        section.missing("face_mm", "the middle of the probe's face: [x, y, z] in mm, or over_target = true");
-    }
+    section.missingIf(!face, "face_mm", "the middle of the probe's face: [x, y, z] in mm, or over_target = true");
     probe.face = *face;
     probe.direction = readDirection(section, "direction");
     probe.lateral = readDirection(section, "lateral");
@@ -67,15 +63,56 @@ void readPlace(Section& section, ProbeSpec& probe)
     probe.lateral = glm::normalize(across);
 }
 
+constexpr double largest = 5000;  // of a direction's numbers
+
+constexpr std::array<Field<GravitySpec>, 2> gravityFields{{
+    {"g_m_s2", "m/s^2", 0, 30, 1, &GravitySpec::strength},
+    {"modulus", "", 0.001, 100, 1, &GravitySpec::modulus},
+}};
+
+// A posture by its name, or where things fall in it.
+Vec3 readDown(Section& section, std::string_view named, std::string_view directed)
+{
+    std::array<std::string_view, patientPostures.size()> names;
+    std::ranges::transform(patientPostures, names.begin(), &PatientPosture::name);
+    section.refuseIf(section.has(named) && section.has(directed), directed, fmt::format("{} says it already", named));
+    if (const auto index = section.choice(named, names)) {
+        return patientPostures[*index].down;
+    }
+    const auto direction = section.direction(directed, largest);
+    section.missingIf(!direction, named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
+    return *direction;
+}
+
+std::string downText(std::string_view named, std::string_view directed, Vec3 down)
+{
+    const auto posture = std::ranges::find(patientPostures, down, &PatientPosture::down);
+    return posture != std::end(patientPostures)
+               ? fmt::format("{} = \"{}\"\n", named, posture->name)
+               : fmt::format("{} = [{:.12g}, {:.12g}, {:.12g}]\n", directed, down.x, down.y, down.z);
+}
+
+struct Setting {
+    std::string_view name;
+    double spacing;  // [m]
+    int window;
+    int cycles;
+};
+
+constexpr ElasticSettings standard;
+constexpr std::array<Setting, 3> settings{{
+    {"fast", 4e-3, 9, 1},
+    {"default", standard.spacing, standard.window, standard.cycles},
+    {"fine", 1.5e-3, 19, 2},
+}};
+
 }  // namespace
 
 void readProbe(Section& top, ProbeSpec& probe)
 {
     if (std::optional<Section> section = top.section("probe")) {
         const auto kind = section->choice("kind", std::span(probeKinds).subspan(1));
-        if (!kind) {
-            section->missing("kind", "linear or curved");
-        }
+        section->missingIf(!kind, "kind", "linear or curved");
         probe.kind = static_cast<ProbeKind>(*kind + 1);
         probe.overTarget = section->flag("over_target").value_or(false);
         if (!probe.overTarget) {
@@ -87,17 +124,13 @@ void readProbe(Section& top, ProbeSpec& probe)
     for (Section& section : top.sections("probe_step")) {
         section.refuseIf(probe.kind == ProbeKind::none, "at_s", "a step of a probe needs a [probe]");
         ProbeStep step;
-        if (!section.has("at_s")) {
-            section.missing("at_s", "when the probe is there [s]");
-        }
+        section.missingIf(!section.has("at_s"), "at_s", "when the probe is there [s]");
         readFields<ProbeStep>(section, probeStepFields, step, Need::some);
         section.refuseIf(!probe.script.empty() && step.time <= probe.script.back().time, "at_s",
                          "must be later than the step before", "s");
         section.finish();
         probe.script.push_back(step);
-        if (probe.script.size() > maxProbeSteps) {
-            section.refuse("at_s", fmt::format("over {} steps", maxProbeSteps));
-        }
+        section.refuseIf(probe.script.size() > maxProbeSteps, "at_s", fmt::format("over {} steps", maxProbeSteps));
     }
 }
 
@@ -181,45 +214,6 @@ std::string ctText(const CtSpec& ct)
                       : std::string();
 }
 
-namespace {
-
-constexpr double largest = 5000;  // of a direction's numbers
-
-constexpr std::array<Field<GravitySpec>, 2> gravityFields{{
-    {"g_m_s2", "m/s^2", 0, 30, 1, &GravitySpec::strength},
-    {"modulus", "", 0.001, 100, 1, &GravitySpec::modulus},
-}};
-
-// A posture by its name, or where things fall in it.
-Vec3 readDown(Section& section, std::string_view named, std::string_view directed)
-{
-    std::array<std::string_view, patientPostures.size()> names;
-    std::ranges::transform(patientPostures, names.begin(), &PatientPosture::name);
-    if (section.has(named) && section.has(directed)) {
-        section.refuse(directed, fmt::format("{} says it already", named));
-    }
-    if (const auto index = section.choice(named, names)) {
-        return patientPostures[*index].down;
-    }
-    const auto direction = section.direction(directed, largest);
-    if (!direction) {
-        section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
-    }
-    return *direction;
-}
-
-std::string downText(std::string_view named, std::string_view directed, Vec3 down)
-{
-    for (const PatientPosture& posture : patientPostures) {
-        if (posture.down == down) {
-            return fmt::format("{} = \"{}\"\n", named, posture.name);
-        }
-    }
-    return fmt::format("{} = [{:.12g}, {:.12g}, {:.12g}]\n", directed, down.x, down.y, down.z);
-}
-
-}  // namespace
-
 void readGravity(Section& top, GravitySpec& gravity)
 {
     if (std::optional<Section> section = top.section("gravity")) {
@@ -238,24 +232,6 @@ std::string gravityText(const GravitySpec& gravity)
                                        writeFields<GravitySpec>(gravityFields, gravity))
                          : std::string();
 }
-
-namespace {
-
-struct Setting {
-    std::string_view name;
-    double spacing;  // [m]
-    int window;
-    int cycles;
-};
-
-constexpr ElasticSettings standard;
-constexpr std::array<Setting, 3> settings{{
-    {"fast", 4e-3, 9, 1},
-    {"default", standard.spacing, standard.window, standard.cycles},
-    {"fine", 1.5e-3, 19, 2},
-}};
-
-}  // namespace
 
 std::vector<std::string> elasticSettings()
 {

@@ -134,9 +134,7 @@ std::filesystem::path resolved(const std::string& file, const std::filesystem::p
 void readVolume(Section& top, const std::filesystem::path& origin, VolumeSource& source)
 {
     std::optional<Section> volume = top.section("volume");
-    if (!volume) {
-        top.missing("[volume]", "a scene needs file = \"..\" or phantom = \"..\" in it");
-    }
+    top.missingIf(!volume, "[volume]", "a scene needs file = \"..\" or phantom = \"..\" in it");
     top.refuseIf(volume->has("file") == volume->has("phantom"), "volume",
                  "needs one of file = \"..\" and phantom = \"..\"");
     if (const auto file = volume->word("file")) {
@@ -173,14 +171,11 @@ void readTool(Section& top, ToolSpec& tool)
         readChoice(*section, "kind", toolKinds, tool.kind);
         readFields<ToolSpec>(*section, toolFields, tool, Need::some);
         section->finish();
-        if (tool.kind == ToolKind::needle && tool.notchRadius >= tool.radius) {
-            section->refuse(section->has("notch_radius_mm") ? "notch_radius_mm" : "radius_mm",
-                            "the notch must be narrower than the needle", "mm");
-        }
-        if (tool.kind == ToolKind::needle && tool.tipLength >= tool.length) {
-            section->refuse(section->has("tip_mm") ? "tip_mm" : "length_mm", "the tip must be shorter than the needle",
-                            "mm");
-        }
+        section->refuseIf(tool.kind == ToolKind::needle && tool.notchRadius >= tool.radius,
+                          section->has("notch_radius_mm") ? "notch_radius_mm" : "radius_mm",
+                          "the notch must be narrower than the needle", "mm");
+        section->refuseIf(tool.kind == ToolKind::needle && tool.tipLength >= tool.length,
+                          section->has("tip_mm") ? "tip_mm" : "length_mm", "the tip must be shorter than the needle", "mm");
     }
 }
 
@@ -244,14 +239,10 @@ void readVital(Section& top, std::vector<VitalStructure>& vital)
     for (Section& section : top.sections("vital")) {
         VitalStructure structure;
         readFields<VitalStructure>(section, vitalFields, structure, Need::some);
-        if (structure.name.empty()) {
-            section.missing("name", "a structure or tissue of the volume");
-        }
+        section.missingIf(structure.name.empty(), "name", "a structure or tissue of the volume");
         section.finish();
         vital.push_back(std::move(structure));
-        if (vital.size() > maxVital) {
-            section.refuse("name", fmt::format("over {} vital structures", maxVital));
-        }
+        section.refuseIf(vital.size() > maxVital, "name", fmt::format("over {} vital structures", maxVital));
     }
 }
 
@@ -272,9 +263,7 @@ void readInserts(Section& top, std::vector<Insert>& inserts)
         }
         section.finish();
         inserts.push_back(std::move(insert));
-        if (inserts.size() > maxInserts) {
-            section.refuse("name", fmt::format("over {} inserts", maxInserts));
-        }
+        section.refuseIf(inserts.size() > maxInserts, "name", fmt::format("over {} inserts", maxInserts));
     }
 }
 
@@ -282,9 +271,7 @@ void readScript(Section& top, std::vector<TraineeStep>& script)
 {
     for (Section& section : top.sections("script")) {
         TraineeStep step;
-        if (!section.has("kind")) {
-            section.missing("kind", "move, press, pierce, fire or wait");
-        }
+        section.missingIf(!section.has("kind"), "kind", "move, press, pierce, fire or wait");
         readChoice(section, "kind", stepKinds, step.kind);
         readFields<TraineeStep>(section, stepFields, step, Need::some);
         if (const auto to = section.point("to_mm", farthestCoordinate)) {
@@ -292,14 +279,11 @@ void readScript(Section& top, std::vector<TraineeStep>& script)
         } else if (step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait) {
             section.missing("to_mm", "where the tip shall go: [x, y, z] in mm");
         }
-        if (step.kind == TraineeStep::Kind::wait && step.seconds <= 0) {
-            section.missing("seconds", "how long to wait, above 0 s");
-        }
+        section.missingIf(step.kind == TraineeStep::Kind::wait && step.seconds <= 0, "seconds",
+                          "how long to wait, above 0 s");
         section.finish();
         script.push_back(step);
-        if (script.size() > maxSteps) {
-            section.refuse("kind", fmt::format("over {} steps", maxSteps));
-        }
+        section.refuseIf(script.size() > maxSteps, "kind", fmt::format("over {} steps", maxSteps));
     }
 }
 
@@ -403,9 +387,8 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     top.refuseIf(scene.ct.given() && scene.probe.kind != ProbeKind::none, "ct",
                  "a scene is guided by ultrasound ([probe]) or by CT ([ct]), not by both");
     top.finish();
-    if (scene.target.empty() && !scene.aim) {
-        top.missing("[target]", "structure = \"..\", what to sample, or aim_mm = [x, y, z]");
-    }
+    top.missingIf(scene.target.empty() && !scene.aim, "[target]",
+                  "structure = \"..\", what to sample, or aim_mm = [x, y, z]");
     if (tissues) {
         scene.tissues = resolved(*tissues, origin).string();
         replaceString(scene.text, root.get("tissues"), scene.tissues);

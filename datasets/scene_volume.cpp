@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <ranges>
 #include <utility>
 
 namespace palpate::datasets {
@@ -31,18 +32,6 @@ std::string lower(std::string text)
 Role roleOf(const Tissue& tissue, const Structure& structure)
 {
     return tissue.table().rows[structure.tissue].role;
-}
-
-// The names of all structures that are not air.
-std::vector<std::string> solidNames(const Tissue& tissue)
-{
-    std::vector<std::string> names;
-    for (const Structure& s : tissue.structures()) {
-        if (roleOf(tissue, s) != Role::air) {
-            names.push_back(s.name);
-        }
-    }
-    return names;
 }
 
 struct Candidate {
@@ -79,7 +68,26 @@ std::vector<VitalStructure> chooseVital(const Tissue& tissue, const std::string&
     return base::mapped<VitalStructure>(candidates, [&](const Candidate& c) { return VitalStructure{.name = c.name}; });
 }
 
+Tissue volumeAlone(const Scene& scene)
+{
+    if (scene.source.file.empty()) {
+        auto table = scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues);
+        return makePhantom(scene.source.phantom, withChanges(std::move(table), scene.tissueChanges));
+    }
+    base::failIf(scene.source.file.extension() != ".vdb", "{}: not a .vdb volume: convert it with `palpate import`",
+                 scene.source.file.native());
+    Tissue tissue = Tissue::load(scene.source.file);
+    return scene.tissueChanges.empty() ? std::move(tissue)
+                                       : withTable(tissue, withChanges(tissue.table(), scene.tissueChanges));
+}
+
 }  // namespace
+
+std::vector<std::string> solidNames(const Tissue& tissue)
+{
+    auto solid = tissue.structures() | std::views::filter([&](auto& s) { return roleOf(tissue, s) != Role::air; });
+    return base::mapped<std::string>(solid, &Structure::name);
+}
 
 std::string lesionOf(const Tissue& tissue)
 {
@@ -124,23 +132,6 @@ Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, co
     scene.vital = chooseVital(tissue, scene.target);
     return parseScene(sceneText(scene), file);
 }
-
-namespace {
-
-Tissue volumeAlone(const Scene& scene)
-{
-    if (scene.source.file.empty()) {
-        auto table = scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues);
-        return makePhantom(scene.source.phantom, withChanges(std::move(table), scene.tissueChanges));
-    }
-    base::failIf(scene.source.file.extension() != ".vdb", "{}: not a .vdb volume: convert it with `palpate import`",
-                 scene.source.file.native());
-    Tissue tissue = Tissue::load(scene.source.file);
-    return scene.tissueChanges.empty() ? std::move(tissue)
-                                       : withTable(tissue, withChanges(tissue.table(), scene.tissueChanges));
-}
-
-}  // namespace
 
 Tissue sceneVolume(const Scene& scene)
 {

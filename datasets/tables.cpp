@@ -78,9 +78,7 @@ void readAcoustics(Section& section, Acoustics& acoustics)
 Role readRole(Section& section)
 {
     const std::optional<std::string> text = section.word("role");
-    if (!text) {
-        section.missing("role", "plain, skin, tumour, vital, bone or air");
-    }
+    section.missingIf(!text, "role", "plain, skin, tumour, vital, bone or air");
     const std::optional<Role> role = volume::roleNamed(*text);
     section.refuseIf(!role, "role", "must be plain, skin, tumour, vital, bone or air");
     return *role;
@@ -126,9 +124,7 @@ TissueRow readTissue(Section& section)
 {
     TissueRow row;
     const std::optional<std::string> name = section.word("name");
-    if (!name) {
-        section.missing("name", "");
-    }
+    section.missingIf(!name, "name", "");
     row.name = *name;
     section.setTitle(fmt::format("tissue '{}':", row.name));
     row.role = readRole(section);
@@ -137,21 +133,16 @@ TissueRow readTissue(Section& section)
     readFields<TissueRow>(section, measuredFields, row, Need::some);
     readAcoustics(section, row.acoustics);
     section.finish();
-    if (row.wallSpacing > 0.0 && row.wallForce <= 0.0) {
-        section.missing("wall_n", "what the walls hold");
-    }
-    if (row.wallForce > 0.0 && row.wallSpacing <= 0.0) {
-        section.missing("wall_spacing_mm", "how far the walls are from each other");
-    }
-    if (row.wallSpacing > 0.0 && row.wallSource.empty()) {
-        section.missing("wall_source", "where wall_spacing_mm and wall_n come from");
-    }
+    section.missingIf(row.wallSpacing > 0.0 && row.wallForce <= 0.0, "wall_n", "what the walls hold");
+    section.missingIf(row.wallForce > 0.0 && row.wallSpacing <= 0.0, "wall_spacing_mm",
+                      "how far the walls are from each other");
+    section.missingIf(row.wallSpacing > 0.0 && row.wallSource.empty(), "wall_source",
+                      "where wall_spacing_mm and wall_n come from");
     if (const auto [key, why] = misfit(row); !key.empty()) {
         section.refuse(key, why, key == "cutting_n" ? "N" : key == "youngs_kpa" ? "kPa" : "");
     }
-    if (row.relaxation().any() && row.relaxationSource.empty()) {
-        section.missing("relaxation_source", "where relaxing_fast and relaxing_slow come from");
-    }
+    section.missingIf(row.relaxation().any() && row.relaxationSource.empty(), "relaxation_source",
+                      "where relaxing_fast and relaxing_slow come from");
     return row;
 }
 
@@ -167,9 +158,7 @@ TissueTable readTissues(std::string_view text, const std::string& file)
         section.refuseIf(table.rows.empty() != (row.name == "air") || (row.name == "air") != (row.role == Role::air),
                          "role", "the first tissue, and no other, must be \"air\" of role air");
         table.rows.push_back(std::move(row));
-        if (table.rows.size() > maxTissues) {
-            section.refuse("name", fmt::format("over {} tissues", maxTissues));
-        }
+        section.refuseIf(table.rows.size() > maxTissues, "name", fmt::format("over {} tissues", maxTissues));
     }
     top.finish();
     base::failIf(table.rows.empty(), "{}: no [[tissue]] in it: see `palpate phantom --help` for the built-in table", file);

@@ -41,9 +41,7 @@ void readFields(Section& section, std::span<const Field<T>> fields, T& target, N
                 }
             },
             f.member);
-        if (need == Need::all && !section.has(f.key)) {
-            section.missing(f.key, f.unit);
-        }
+        section.missingIf(need == Need::all && !section.has(f.key), f.key, f.unit);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <base/error.h>
 #include <base/inputs.h>
+#include <base/mapped.h>
 #include <base/nearest.h>
 #include <volume/direction.h>
 
@@ -13,13 +14,10 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
 namespace {
-
-constexpr std::uintmax_t largestFile = 16U << 20U;
 
 std::string_view kind(const toml::node& node)
 {
@@ -94,13 +92,8 @@ toml::table parseToml(std::string_view text, const std::string& file)
 
 std::string readText(const std::filesystem::path& file)
 {
-    if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        throw base::error("{}: {}", file.string(), why);
-    }
-    std::error_code error;
-    if (const auto size = std::filesystem::file_size(file, error); error || size > largestFile) {
-        throw std::runtime_error(file.string() + ": over 16 MB, too large for a settings file: is it a volume?");
-    }
+    base::checkTable(file, "a settings file");
+
     std::ifstream in(file, std::ios::binary);
     std::ostringstream text;
     text << in.rdbuf();
@@ -154,9 +147,7 @@ void Section::missing(std::string_view key, std::string_view what) const
 double Section::numberOf(const toml::node& node, std::string_view key, std::string_view unit) const
 {
     const std::optional<double> value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (!value) {
-        refuse(key, fmt::format("expected a number{}{}, found {}", unit.empty() ? "" : " in ", unit, kind(node)));
-    }
+    refuseIf(!value, key, fmt::format("expected a number{}{}, found {}", unit.empty() ? "" : " in ", unit, kind(node)));
     refuseIf(!std::isfinite(*value), key, "must be a finite number", unit);
     return *value;
 }
@@ -181,9 +172,8 @@ std::optional<std::int64_t> Section::integer(std::string_view key, std::string_v
     if (node == nullptr) {
         return std::nullopt;
     }
-    if (!node->is_integer()) {
-        refuse(key, fmt::format("expected a whole number, found {}", node->is_number() ? "a fraction" : kind(*node)), unit);
-    }
+    refuseIf(!node->is_integer(), key,
+             fmt::format("expected a whole number, found {}", node->is_number() ? "a fraction" : kind(*node)), unit);
     const std::int64_t value = node->as_integer()->get();
     if (value < low || value > high) {
         refuse(key, fmt::format("must be {} to {}{}{}", low, high, unit.empty() ? "" : " ", unit), unit);
@@ -197,9 +187,7 @@ std::optional<bool> Section::flag(std::string_view key)
     if (node == nullptr) {
         return std::nullopt;
     }
-    if (!node->is_boolean()) {
-        refuse(key, fmt::format("expected true or false, found {}", kind(*node)));
-    }
+    refuseIf(!node->is_boolean(), key, fmt::format("expected true or false, found {}", kind(*node)));
     return node->as_boolean()->get();
 }
 
@@ -209,9 +197,7 @@ std::optional<std::string> Section::word(std::string_view key)
     if (node == nullptr) {
         return std::nullopt;
     }
-    if (!node->is_string()) {
-        refuse(key, fmt::format("expected text in quotes, found {}", kind(*node)));
-    }
+    refuseIf(!node->is_string(), key, fmt::format("expected text in quotes, found {}", kind(*node)));
     refuseIf(node->as_string()->get().empty(), key, "must not be empty");
     return node->as_string()->get();
 }
@@ -249,10 +235,9 @@ std::optional<Vec3> Section::point(std::string_view key, double limit)
         return std::nullopt;
     }
     const toml::array* list = node->as_array();
-    if (list == nullptr || list->size() != 3) {
-        refuse(key, fmt::format("expected three numbers in mm: [x, y, z], found {}",
-                                list == nullptr ? std::string(kind(*node)) : fmt::format("{} of them", list->size())));
-    }
+    refuseIf(list == nullptr || list->size() != 3, key,
+             fmt::format("expected three numbers in mm: [x, y, z], found {}",
+                         list == nullptr ? std::string(kind(*node)) : fmt::format("{} of them", list->size())));
     Vec3 p(0.0);
     for (int axis = 0; axis < 3; ++axis) {
         p[axis] = numberOf(*list->get(static_cast<std::size_t>(axis)), key, "mm") * 1e-3;
@@ -281,9 +266,7 @@ std::optional<Section> Section::section(std::string_view key)
         return std::nullopt;
     }
     const toml::table* table = node->as_table();
-    if (table == nullptr) {
-        refuse(key, fmt::format("expected a table [{}], found {}", key, kind(*node)));
-    }
+    refuseIf(table == nullptr, key, fmt::format("expected a table [{}], found {}", key, kind(*node)));
     const std::string path = path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key);
     Section inner(*table, file_, fmt::format("[{}]", path));
     inner.path_ = path;
@@ -298,13 +281,9 @@ std::vector<Section> Section::sections(std::string_view key)
         return out;
     }
     const toml::array* list = node->as_array();
-    if (list == nullptr) {
-        refuse(key, fmt::format("expected a list of tables [[{}]], found {}", key, kind(*node)));
-    }
+    refuseIf(list == nullptr, key, fmt::format("expected a list of tables [[{}]], found {}", key, kind(*node)));
     for (const toml::node& n : *list) {
-        if (!n.is_table()) {
-            refuse(key, fmt::format("expected a list of tables [[{}]], found {} in it", key, kind(n)));
-        }
+        refuseIf(!n.is_table(), key, fmt::format("expected a list of tables [[{}]], found {} in it", key, kind(n)));
         out.emplace_back(*n.as_table(), file_, fmt::format("[[{}]]", key));
     }
     return out;
@@ -312,11 +291,7 @@ std::vector<Section> Section::sections(std::string_view key)
 
 std::vector<std::string> Section::keys() const
 {
-    std::vector<std::string> out;
-    for (const auto& [key, node] : *table_) {
-        out.emplace_back(key.str());
-    }
-    return out;
+    return base::mapped<std::string>(*table_, [](const auto& entry) { return entry.first.str(); });
 }
 
 void Section::finish() const

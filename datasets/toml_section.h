@@ -66,6 +66,12 @@ public:
     }
     /// Says that `key` is missing.
     [[noreturn]] void missing(std::string_view key, std::string_view what) const;
+    void missingIf(bool wrong, std::string_view key, std::string_view what) const
+    {
+        if (wrong) {
+            missing(key, what);
+        }
+    }
     /// Refuses keys that nobody asked for, with the nearest of those that were.
     void finish() const;
 

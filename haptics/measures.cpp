@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace palpate::haptics {
@@ -166,9 +168,7 @@ LabelledValues describeMeasures(const Score& score)
 LabelledValues describe(const Score& score)
 {
     LabelledValues lines = describeTotal(score);
-    for (auto& line : describeMeasures(score)) {
-        lines.push_back(std::move(line));
-    }
+    std::ranges::move(describeMeasures(score), std::back_inserter(lines));
     return lines;
 }
 

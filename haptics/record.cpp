@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <exception>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <set>
@@ -27,8 +28,7 @@ class Snapshot {
 public:
     explicit Snapshot(Database& database) : database_(database) { database_.execute("BEGIN"); }
     ~Snapshot() { sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr); }
-    Snapshot(const Snapshot&) = delete;
-    Snapshot& operator=(const Snapshot&) = delete;
+    Snapshot& operator=(Snapshot&&) = delete;
 
 private:
     Database& database_;
@@ -43,12 +43,9 @@ std::int64_t single(Database& database, const std::string& sql)
 std::string pathOf(const std::filesystem::path& file)
 {
     std::error_code failed;
-    if (!std::filesystem::exists(file, failed)) {
-        throw base::error("{}: no such file; give the record of a session", file.native());
-    }
-    if (!std::filesystem::is_regular_file(file, failed)) {
-        throw base::error("{}: is not a file; give the record of a session", file.native());
-    }
+    base::failIf(!std::filesystem::exists(file, failed), "{}: no such file; give the record of a session", file.native());
+    base::failIf(!std::filesystem::is_regular_file(file, failed), "{}: is not a file; give the record of a session",
+                 file.native());
     return file.string();
 }
 
@@ -86,14 +83,10 @@ struct Record::Impl {
             work();
         } catch (const std::exception& e) {
             const int status = database ? sqlite3_errcode(database->get()) : SQLITE_CANTOPEN;
-            if (status == SQLITE_NOTADB) {
-                throw base::error("{}: is not a session record; palpate train --record writes one", file);
-            }
-            if (status == SQLITE_CANTOPEN) {
-                throw base::error(
-                    "{}: cannot be opened ({}); copy it, with its -wal file, to a folder that you can read and write", file,
-                    e.what());
-            }
+            base::failIf(status == SQLITE_NOTADB, "{}: is not a session record; palpate train --record writes one", file);
+            base::failIf(status == SQLITE_CANTOPEN,
+                         "{}: cannot be opened ({}); copy it, with its -wal file, to a folder that you can read and write",
+                         file, e.what());
             throw base::error("{}: is damaged ({}); copy it again or take another record", file, e.what());
         }
     }
@@ -114,16 +107,13 @@ struct Record::Impl {
             id = single(*database, "PRAGMA application_id");
             version = static_cast<int>(single(*database, "PRAGMA user_version"));
         });
-        if (id == 0 && single(*database, "SELECT count(*) FROM sqlite_master") == 0) {
-            throw base::error("{}: holds no session: its writer was stopped before it began; remove it", file);
-        }
-        if (id != format::applicationId) {
-            throw base::error("{}: is an SQLite file, but not a session record; palpate train --record writes one", file);
-        }
-        if (version < format::oldestVersion || version > format::version) {
-            throw base::error("{}: is a record of format {}, this program reads {} to {}; use the program that wrote it",
-                              file, version, format::oldestVersion, format::version);
-        }
+        base::failIf(id == 0 && single(*database, "SELECT count(*) FROM sqlite_master") == 0,
+                     "{}: holds no session: its writer was stopped before it began; remove it", file);
+        base::failIf(id != format::applicationId,
+                     "{}: is an SQLite file, but not a session record; palpate train --record writes one", file);
+        base::failIf(version < format::oldestVersion || version > format::version,
+                     "{}: is a record of format {}, this program reads {} to {}; use the program that wrote it", file,
+                     version, format::oldestVersion, format::version);
         if (version < format::sealedVersion && !statementOf("seal").empty()) {
             throw base::error(
                 "{}: is damaged (a record of format {} has no seal, and here one is); copy it again or take another", file,
@@ -270,9 +260,7 @@ struct Record::Impl {
             }
             seal.sha256 = whole.sha256;
             std::vector<format::SealedPart> found = format::sealOfSmallTables(*database);
-            for (format::SealedPart& part : format::sealOfTicks(*database, format::columnsOf(info, version))) {
-                found.push_back(std::move(part));
-            }
+            std::ranges::move(format::sealOfTicks(*database, format::columnsOf(info, version)), std::back_inserter(found));
             seal.changed = format::compareSeals(sealed, found);
             if (sealed.empty()) {
                 seal.changed = {"the seal is gone"};

@@ -5,9 +5,10 @@
 #include <haptics/score.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include <algorithm>
 #include <optional>
+#include <ranges>
 
 namespace palpate::haptics {
 
@@ -75,10 +76,7 @@ std::string sceneInWords(const SessionInfo& info)
 
 std::string someOf(const std::vector<std::string>& parts, std::size_t most)
 {
-    std::string text;
-    for (std::size_t i = 0; i < std::min(parts.size(), most); ++i) {
-        text += (text.empty() ? "" : "; ") + parts[i];
-    }
+    const std::string text = fmt::format("{}", fmt::join(parts | std::views::take(most), "; "));
     return parts.size() > most ? fmt::format("{}; and {} more", text, parts.size() - most) : text;
 }
 

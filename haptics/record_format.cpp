@@ -162,9 +162,7 @@ std::string_view Statement::text(int column) const
 
 void Statement::check(int status)
 {
-    if (status != SQLITE_OK) {
-        throw std::runtime_error(sqlite3_errmsg(database_));
-    }
+    base::failIf(status != SQLITE_OK, "{}", sqlite3_errmsg(database_));
 }
 
 }  // namespace palpate::haptics::format

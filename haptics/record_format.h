@@ -150,8 +150,7 @@ class Database {
 public:
     Database(const std::string& file, int flags);
     ~Database();
-    Database(const Database&) = delete;
-    Database& operator=(const Database&) = delete;
+    Database& operator=(Database&&) = delete;
 
     void execute(const std::string& sql);
     sqlite3* get() const noexcept { return handle_; }
@@ -171,8 +170,7 @@ public:
         bindAll(values...);
     }
     ~Statement();
-    Statement(const Statement&) = delete;
-    Statement& operator=(const Statement&) = delete;
+    Statement& operator=(Statement&&) = delete;
 
     void bind(int position, double value);
     void bind(int position, std::int64_t value);

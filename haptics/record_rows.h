@@ -43,9 +43,8 @@ inline std::int64_t integerOf(const Statement& row, int column, const char* name
 
 inline double realOf(const Statement& row, int column, const char* name)
 {
-    if (const int type = row.type(column); type == SQLITE_TEXT || type == SQLITE_BLOB) {
-        throw base::error("{} is no number", name);
-    }
+    const int type = row.type(column);
+    base::failIf(type == SQLITE_TEXT || type == SQLITE_BLOB, "{} is no number", name);
     return row.real(column);
 }
 

@@ -4,6 +4,7 @@
 #include <haptics/record_format.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -109,11 +110,7 @@ std::string RowDigest::text() const
     base::failIf(!copy || EVP_MD_CTX_copy_ex(copy.get(), context_.get()) != 1 ||
                      EVP_DigestFinal_ex(copy.get(), bytes.data(), &count) != 1,
                  "SHA-256 cannot be computed");
-    std::string out;
-    for (unsigned i = 0; i < count; ++i) {
-        out += fmt::format("{:02x}", bytes[i]);
-    }
-    return out;
+    return fmt::format("{:02x}", fmt::join(bytes.begin(), bytes.begin() + count, ""));
 }
 
 RowDigest& RunningSeal::ticks(std::uint64_t tick)

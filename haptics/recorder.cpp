@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -91,9 +92,7 @@ void giveName(const std::string& part, const std::string& file)
     if (failed == EINVAL && !std::filesystem::exists(file)) {  // a file system that cannot refuse by itself
         failed = std::rename(part.c_str(), file.c_str()) == 0 ? 0 : errno;
     }
-    if (failed == EEXIST || failed == EINVAL) {
-        throw base::error("{}: exists already; choose another name or remove it", file);
-    }
+    base::failIf(failed == EEXIST || failed == EINVAL, "{}: exists already; choose another name or remove it", file);
     if (failed != 0) {
         refuse(file, std::strerror(failed));
     }
@@ -102,9 +101,7 @@ void giveName(const std::string& part, const std::string& file)
 // Makes a record without ticks under another name first, so that the file is there whole or not at all.
 void makeFile(const std::string& file, const SessionInfo& info)
 {
-    if (std::filesystem::exists(file)) {
-        throw base::error("{}: exists already; choose another name or remove it", file);
-    }
+    base::failIf(std::filesystem::exists(file), "{}: exists already; choose another name or remove it", file);
     const std::string part = file + "." + std::to_string(::getpid()) + ".part";
     removeFile(part);
     try {
@@ -223,9 +220,7 @@ public:
     void seal()
     {
         std::vector<format::SealedPart> parts = format::sealOfSmallTables(database_);
-        for (format::SealedPart& part : seal_.parts()) {
-            parts.push_back(std::move(part));
-        }
+        std::ranges::move(seal_.parts(), std::back_inserter(parts));
         parts.push_back(format::sealOf(parts));
         database_.execute("DELETE FROM seal");
         for (const format::SealedPart& part : parts) {
@@ -259,12 +254,6 @@ private:
     Statement tick_, event_, core_, fraction_;
 };
 
-// Eight seconds at the session's rate, and never of less than eight at 1 kHz.
-std::size_t ringCapacity(double rate)
-{
-    return static_cast<std::size_t>(std::clamp(8 * rate, 8192.0, 65536.0));
-}
-
 // The writer thread takes no signals; one about the size of files (RLIMIT_FSIZE) would end the process.
 class SignalsBlocked {
 public:
@@ -275,8 +264,7 @@ public:
         pthread_sigmask(SIG_SETMASK, &all, &before_);
     }
     ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-    SignalsBlocked(const SignalsBlocked&) = delete;
-    SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+    SignalsBlocked& operator=(SignalsBlocked&&) = delete;
 
 private:
     sigset_t before_{};
@@ -303,7 +291,9 @@ struct Recorder::Impl {
     std::thread thread;
     bool closed = false;  // of that thread: all that was written is sealed
 
-    Impl(const std::string& path, const SessionInfo& info) : file(path), ring(ringCapacity(info.rate))
+    // The ring holds eight seconds at the session's rate, and never less than eight at 1 kHz.
+    Impl(const std::string& path, const SessionInfo& info)
+        : file(path), ring(static_cast<std::size_t>(std::clamp(8 * info.rate, 8192.0, 65536.0)))
     {
         // Touches every page of the ring now and not in the servo loop.
         while (ring.push(TickRecord{})) {

@@ -1,6 +1,7 @@
 #include <haptics/replay.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <haptics/score.h>
 #include <haptics/simulation.h>
 #include <volume/fnv.h>
@@ -140,9 +141,7 @@ SessionInfo infoOf(const SessionModel& model)
         info.structures.push_back(s.name);
         info.warnDistances.push_back(s.warnDistance);
     }
-    for (const auto& row : model.tissue->table().rows) {
-        info.tissues.push_back(row.name);
-    }
+    info.tissues = base::mapped<std::string>(model.tissue->table().rows, &volume::TissueRow::name);
     return info;
 }
 

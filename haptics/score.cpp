@@ -27,6 +27,18 @@ double ramp(double value, double full, double none) noexcept
     return std::clamp((none - value) / (none - full), 0.0, 1.0);
 }
 
+// However well it was done: who missed has no technique to be praised for.
+void addCore(const Score& s, const ScoreShares& share, ScoreParts& p) noexcept
+{
+    if (s.passes == 0) {
+        return;
+    }
+    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
+             10 * ramp(s.targetingError, 0, 10e-3);
+    const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
+    p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
+}
+
 }  // namespace
 
 TargetShape shapeOfTarget(const SessionModel& model)
@@ -119,22 +131,6 @@ Judged judgedBy(const Score& s) noexcept
     const bool needle = s.aim.tool == datasets::ToolKind::needle;
     return needle ? Judged::core : s.marks > 0 ? Judged::marks : Judged::nothing;
 }
-
-namespace {
-
-// However well it was done: who missed has no technique to be praised for.
-void addCore(const Score& s, const ScoreShares& share, ScoreParts& p) noexcept
-{
-    if (s.passes == 0) {
-        return;
-    }
-    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
-             10 * ramp(s.targetingError, 0, 10e-3);
-    const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
-    p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
-}
-
-}  // namespace
 
 ScoreParts parts(const Score& s) noexcept
 {

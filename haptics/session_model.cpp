@@ -6,6 +6,7 @@
 #include <haptics/posed.h>
 #include <haptics/probe_placement.h>
 
+#include <fmt/ranges.h>
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -97,17 +98,6 @@ bool anyWalls(const volume::Tissue& tissue)
                                [&](const auto& s) { return tissue.table().rows[s.tissue].wallSpacing > 0.0; });
 }
 
-std::string structureNames(const volume::Tissue& tissue)
-{
-    std::string names;
-    for (const auto& s : tissue.structures()) {
-        if (tissue.table().rows[s.tissue].role != volume::Role::air) {
-            names += (names.empty() ? "" : ", ") + s.name;
-        }
-    }
-    return names;
-}
-
 GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& grid, const std::string& name,
                          const std::string& what, const std::string& scene)
 {
@@ -115,7 +105,8 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     s.name = name;
     s.labels = tissue.labelsNamed(name);
     if (s.labels.empty()) {
-        throw base::error("{}: {} '{}' is not in the volume; it has: {}", scene, what, name, structureNames(tissue));
+        throw base::error("{}: {} '{}' is not in the volume; it has: {}", scene, what, name,
+                          fmt::join(datasets::solidNames(tissue), ", "));
     }
     s.distance = tissue.distanceTo(s.labels, grid);
     return s;

@@ -1,5 +1,7 @@
 #include <planner/figures.h>
 
+#include <base/mapped.h>
+
 #include <nlohmann/json.hpp>
 
 namespace palpate::planner {
@@ -43,10 +45,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
 
 nlohmann::json planFigures(const std::string& scene, const Plan& plan, const PlanRequest& request, const std::string& costs)
 {
-    auto candidates = nlohmann::json::array();
-    for (const PlanCandidate& c : plan.candidates) {
-        candidates.push_back(candidateFigures(c));
-    }
+    const auto candidates = base::mapped<nlohmann::json>(plan.candidates, candidateFigures);
     nlohmann::json out = plan.choice ? candidateFigures(plan.candidates[*plan.choice]) : nlohmann::json::object();
     out["scene"] = scene;
     out["found"] = plan.choice.has_value();

@@ -1,6 +1,7 @@
 #include <planner/planner.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 #include <studies/kernel/kernel_rivals.h>
 
 #include <fmt/format.h>
@@ -254,6 +255,45 @@ private:
     Plan plan_;
 };
 
+constexpr std::size_t maxSlots = 200000;  // beyond any tick of a millisecond
+constexpr double speed = 0.02;            // [m/s]
+constexpr double poissonCap = 0.49;
+constexpr double nanosecond = 1e-3;  // [us]
+
+using Terms = std::array<double, 4>;
+
+TickSample timed(const chainmail::ElasticBody& body, const studies::TrialPath& path,
+                 const chainmail::ElasticOptions& options)
+{
+    studies::TrialLoad load(path);
+    chainmail::Elastic elastic(body, options, load.load().focus);
+    const studies::TrialResult result = studies::timeTrial(studies::elasticModel(elastic), path, speed);
+    TickSample sample;
+    sample.work = {static_cast<double>(slotsOf(elastic.stack())), result.meanCycles, result.meanTouched};
+    sample.finite = !volume::isSmall(options.law);
+    sample.microseconds = 1e6 * result.cpu;
+    return sample;
+}
+
+// Every window and law on one body and path.
+void addTimes(const studies::TrialBody& body, const studies::TrialPath& path, bool quick, std::vector<TickSample>& out)
+{
+    const std::vector<int> windows = quick ? std::vector{9, 13} : std::vector{9, 13, 15, 21, 31};
+    for (const int window : windows) {
+        const chainmail::WindowStack stack(body.body, window, studies::TrialLoad(path).load().focus);
+        if (slotsOf(stack) > maxSlots) {
+            continue;
+        }
+        for (const auto& [cycles, finite] : {std::pair(1, false), {2, false}, {1, true}, {2, true}}) {
+            const volume::Law law = finite ? volume::finiteOf({}) : volume::Law();
+            out.push_back(timed(body.body, path, {.window = window, .cycles = cycles, .law = law}));
+            out.back().name =
+                fmt::format("{:g} mm, window {}, {} cycle{}{}, sphere {:g} mm", 1e3 * body.cells.spacing, window, cycles,
+                            cycles == 1 ? "" : "s", finite ? ", finite strain" : "", 1e3 * path.tool.radius);
+        }
+    }
+}
+
 }  // namespace
 
 std::string PlanCandidate::name() const
@@ -310,49 +350,6 @@ Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
     return Planner(model, request, progress).run();
 }
 
-namespace {
-
-constexpr std::size_t maxSlots = 200000;  // beyond any tick of a millisecond
-constexpr double speed = 0.02;            // [m/s]
-constexpr double poissonCap = 0.49;
-constexpr double nanosecond = 1e-3;  // [us]
-
-using Terms = std::array<double, 4>;
-
-TickSample timed(const chainmail::ElasticBody& body, const studies::TrialPath& path,
-                 const chainmail::ElasticOptions& options)
-{
-    studies::TrialLoad load(path);
-    chainmail::Elastic elastic(body, options, load.load().focus);
-    const studies::TrialResult result = studies::timeTrial(studies::elasticModel(elastic), path, speed);
-    TickSample sample;
-    sample.work = {static_cast<double>(slotsOf(elastic.stack())), result.meanCycles, result.meanTouched};
-    sample.finite = !volume::isSmall(options.law);
-    sample.microseconds = 1e6 * result.cpu;
-    return sample;
-}
-
-// Every window and law on one body and path.
-void addTimes(const studies::TrialBody& body, const studies::TrialPath& path, bool quick, std::vector<TickSample>& out)
-{
-    const std::vector<int> windows = quick ? std::vector{9, 13} : std::vector{9, 13, 15, 21, 31};
-    for (const int window : windows) {
-        const chainmail::WindowStack stack(body.body, window, studies::TrialLoad(path).load().focus);
-        if (slotsOf(stack) > maxSlots) {
-            continue;
-        }
-        for (const auto& [cycles, finite] : {std::pair(1, false), {2, false}, {1, true}, {2, true}}) {
-            const volume::Law law = finite ? volume::finiteOf({}) : volume::Law();
-            out.push_back(timed(body.body, path, {.window = window, .cycles = cycles, .law = law}));
-            out.back().name =
-                fmt::format("{:g} mm, window {}, {} cycle{}{}, sphere {:g} mm", 1e3 * body.cells.spacing, window, cycles,
-                            cycles == 1 ? "" : "s", finite ? ", finite strain" : "", 1e3 * path.tool.radius);
-        }
-    }
-}
-
-}  // namespace
-
 double tickTime(const LawCosts& costs, const TickWork& work) noexcept
 {
     return nanosecond * (work.slots * (costs.perSlot + work.cycles * costs.perSlotCycle) +
@@ -395,11 +392,8 @@ LawCosts fitCosts(std::span<const TickSample> samples)
 
 std::size_t slotsOf(const chainmail::WindowStack& stack) noexcept
 {
-    std::size_t sum = 0;
-    for (const chainmail::Window& w : stack.windows()) {
-        sum += w.layout.count;
-    }
-    return sum;
+    return base::sumOf(
+        stack.windows(), [](const chainmail::Window& w) { return w.layout.count; }, std::size_t{0});
 }
 
 std::vector<TickSample> measureTicks(const haptics::SessionModel& model, bool quick,

@@ -12,12 +12,10 @@ namespace {
 
 py::object plan(const py::object& what, double error, const std::optional<double>& forceError, double budget, double speed)
 {
-    if (!(error > 0 && error <= 1) || (forceError && !(*forceError > 0 && *forceError <= 1))) {
-        throw py::value_error("error, force_error: have to be above 0, and 1 at most: 0.03 is 3 %");
-    }
-    if (!(budget > 0 && budget <= 1 && speed > 0 && speed <= 1)) {
-        throw py::value_error("budget, speed: have to be above 0, and 1 s and 1 m/s at most");
-    }
+    refuseIf(!(error > 0 && error <= 1) || (forceError && !(*forceError > 0 && *forceError <= 1)),
+             "error, force_error: have to be above 0, and 1 at most: 0.03 is 3 %");
+    refuseIf(!(budget > 0 && budget <= 1 && speed > 0 && speed <= 1),
+             "budget, speed: have to be above 0, and 1 s and 1 m/s at most");
     SceneBox box = sceneOf(what);
     const std::string name = box.scene.name;
     planner::PlanRequest request;

@@ -14,6 +14,8 @@
 #include <pybind11/stl/filesystem.h>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 namespace palpate::python {
@@ -157,16 +159,6 @@ SceneBox forVolume(const py::object& what, const std::string& target)
     return {datasets::sceneForVolume(file, *box.tissue, target), file.string(), box.tissue, inMemory};
 }
 
-py::dict toDict(const SceneBox& box)
-{
-    return py::module_::import("tomllib").attr("loads")(datasets::sceneText(box.scene));
-}
-
-std::vector<std::string> structuresOf(const Modelled& modelled)
-{
-    return modelled.info.structures;
-}
-
 py::dict latticeOf(const Modelled& modelled)
 {
     const volume::NodeGrid& grid = modelled.model.lattice.grid;
@@ -201,7 +193,7 @@ void bindModel(py::module_& module)
                                    box->file = fileOf(m);
                                    return box;
                                })
-        .def_property_readonly("structures", structuresOf)
+        .def_property_readonly("structures", [](const Modelled& modelled) { return modelled.info.structures; })
         .def_property_readonly("tissues", [](const Modelled& m) { return m.info.tissues; })
         .def_property_readonly("entry", [](const Modelled& m) { return vectorOf(m.model.approach.entry); })
         .def_property_readonly("aim", [](const Modelled& m) { return vectorOf(m.model.approach.aim); })
@@ -222,9 +214,7 @@ std::vector<std::pair<std::string, py::object>> flattened(const py::dict& tables
     for (const auto& [key, value] : tables) {
         const std::string name = before + py::str(key).cast<std::string>();
         if (py::isinstance<py::dict>(value)) {
-            for (auto& inner : flattened(py::reinterpret_borrow<py::dict>(value), name + ".")) {
-                out.push_back(std::move(inner));
-            }
+            std::ranges::move(flattened(py::reinterpret_borrow<py::dict>(value), name + "."), std::back_inserter(out));
         } else {
             out.emplace_back(name, py::reinterpret_borrow<py::object>(value));
         }
@@ -286,7 +276,10 @@ void bindScene(py::module_& module)
         .def_static("parse", &parsed, py::arg("text"), py::arg("origin") = "text")
         .def_static("for_volume", &forVolume, py::arg("volume"), py::arg("target") = "")
         .def("changed", &changed, py::arg("keys"))
-        .def("to_dict", &toDict)
+        .def("to_dict",
+             [](const SceneBox& box) -> py::dict {
+                 return py::module_::import("tomllib").attr("loads")(datasets::sceneText(box.scene));
+             })
         .def_property_readonly("name", [](const SceneBox& box) { return box.scene.name; })
         .def_property_readonly("text", [](const SceneBox& box) { return datasets::sceneText(box.scene); })
         .def_property_readonly("origin", [](const SceneBox& box) { return box.origin; })

@@ -45,9 +45,7 @@ Vec3 unit(Vec3 axis)
 {
     axis = volume::rescaled(axis);
     const double length = glm::length(axis);
-    if (!(length > 0) || !std::isfinite(length)) {
-        throw py::value_error("pose: the axis has no length");
-    }
+    refuseIf(!(length > 0) || !std::isfinite(length), "pose: the axis has no length");
     return std::abs(length - 1) < 1e-12 ? axis : axis / length;
 }
 
@@ -77,9 +75,7 @@ Doubles doublesOf(const py::handle& given, const char* name, const char* wanted)
 {
     // numpy.ma alone adds this to an array. What it hides would be taken for numbers.
     const bool masked = py::isinstance<py::array>(given) && py::hasattr(given, "mask");
-    if (masked) {
-        throw py::value_error(std::string(name) + ": is a masked array: give a plain one, such as its filled()");
-    }
+    refuseIf(masked, name, ": is a masked array: give a plain one, such as its filled()");
     const auto array = py::array::ensure(given);
     const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
     auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
@@ -119,9 +115,7 @@ Doubles columnOf(const py::object& given, py::ssize_t rows, const char* name, do
     }
     for (py::ssize_t i = 0; i < column.size(); ++i) {
         const double value = column.data()[i];
-        if (!(value >= 0 && value <= most && value == std::floor(value))) {
-            throw py::value_error(std::string(name) + ": " + wanted);
-        }
+        refuseIf(!(value >= 0 && value <= most && value == std::floor(value)), name, ": ", wanted);
     }
     return column;
 }
@@ -137,9 +131,7 @@ std::vector<DeviceSample> samplesOf(const Given& given, Vec3 axis)
         "give an array of n x 3 (positions), n x 6 (and axes) or n x 12 (and the probe's moves), in metres";
     constexpr double buttonBits = std::numeric_limits<std::uint32_t>::max();
     const Doubles poses = doublesOf(given.poses, "poses", shapes);
-    if (poses.ndim() != 2 || !isPoseOf(poses.shape(1))) {
-        throw py::value_error(std::string("poses: ") + shapes);
-    }
+    refuseIf(poses.ndim() != 2 || !isPoseOf(poses.shape(1)), "poses: ", shapes);
     const py::ssize_t rows = poses.shape(0);
     const Doubles buttons = columnOf(given.buttons, rows, "buttons", buttonBits,
                                      "give sums of DEADMAN, FIRE, MARK and UNMARK, whole numbers below 2**32");
@@ -202,9 +194,7 @@ std::size_t advance(SessionBox& box, const py::object& poses, const py::object& 
 
 py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
 {
-    if (!(seconds >= 0)) {
-        throw py::value_error("seconds: has to be 0 or more");
-    }
+    refuseIf(!(seconds >= 0), "seconds: has to be 0 or more");
     const LiveSession::Use use(box.live);
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
@@ -279,18 +269,13 @@ py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object
     request.width = width;
     request.height = height;
     request.depth = depth;
-    if (!(depth >= 0)) {
-        throw py::value_error("depth: has to be 0 or more, in metres");
-    }
+    refuseIf(!(depth >= 0), "depth: has to be 0 or more, in metres");
     if (!face.is_none()) {
         const Vec3 at = vec3Of(face, "face");
-        if (!(glm::length(at) <= farthestFace)) {
-            throw py::value_error("face: has to be three numbers in metres, within 10 m");
-        }
+        refuseIf(!(glm::length(at) <= farthestFace), "face: has to be three numbers in metres, within 10 m");
         const Vec3 inwards = vec3Of(direction, "direction"), along = vec3Of(lateral, "lateral");
-        if (!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along))) {
-            throw py::value_error("direction, lateral: have to be two directions with lengths");
-        }
+        refuseIf(!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along)),
+                 "direction, lateral: have to be two directions with lengths");
         request.pose = ultrasound::poseOf(at, unit(inwards), unit(along));
     }
     UltrasoundPicture picture;

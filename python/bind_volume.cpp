@@ -73,17 +73,12 @@ volume::Affine affineOf(const Matrix& matrix, const std::string& frame)
     if (!matrix) {
         PyErr_Clear();
     }
-    if (!matrix || matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4) {
-        throw py::value_error("affine: give 4 x 4 numbers, voxel index to patient, in metres");
-    }
-    if (frame != "LPS" && frame != "RAS") {
-        throw py::value_error("frame: is LPS or RAS, not " + frame);
-    }
+    refuseIf(!matrix || matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4,
+             "affine: give 4 x 4 numbers, voxel index to patient, in metres");
+    refuseIf(frame != "LPS" && frame != "RAS", "frame: is LPS or RAS, not ", frame);
     const auto at = matrix.unchecked<2>();
     for (int column = 0; column < 4; ++column) {
-        if (at(3, column) != (column < 3 ? 0.0 : 1.0)) {
-            throw py::value_error("affine: its last row has to be 0 0 0 1");
-        }
+        refuseIf(at(3, column) != (column < 3 ? 0.0 : 1.0), "affine: its last row has to be 0 0 0 1");
     }
     volume::Affine affine;
     for (int row = 0; row < 3; ++row) {
@@ -154,9 +149,7 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
 py::array arrayOf(const py::object& what, const char* name)
 {
     const py::object masked = py::module_::import("numpy").attr("ma").attr("MaskedArray");
-    if (py::isinstance(what, masked)) {
-        throw py::value_error(std::string(name) + ": give an array without a mask: fill its masked values (filled)");
-    }
+    refuseIf(py::isinstance(what, masked), name, ": give an array without a mask: fill its masked values (filled)");
     auto array = py::array::ensure(what);
     if (!array) {
         PyErr_Clear();
@@ -172,9 +165,7 @@ Labels labelArray(const py::array& given)
         throw py::value_error("labels: give an array of whole numbers, not of " +
                               py::str(given.dtype()).cast<std::string>());
     }
-    if (given.ndim() != 3) {
-        throw py::value_error("labels: give an array of three dimensions, indexed (i, j, k)");
-    }
+    refuseIf(given.ndim() != 3, "labels: give an array of three dimensions, indexed (i, j, k)");
     if (given.size() > 0 && kind != 'b') {
         // Of any width, 64 bits with or without a sign.
         const py::object low = given.attr("min")(), high = given.attr("max")();
@@ -203,9 +194,8 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
             PyErr_Clear();
             throw py::value_error("image: give an array of numbers");
         }
-        if (values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape())) {
-            throw py::value_error("image: has to have the shape of the labels");
-        }
+        refuseIf(values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape()),
+                 "image: has to have the shape of the labels");
         companion.emplace();
         companion->unit = unit;
         companion->values.assign(values.data(), values.data() + values.size());

@@ -15,6 +15,15 @@ namespace palpate::python {
 
 namespace py = pybind11;
 
+/// Throws ValueError if `wrong`: the parts of its text in a row.
+template <typename... Parts>
+void refuseIf(bool wrong, const Parts&... why)
+{
+    if (wrong) {
+        throw py::value_error((std::string() + ... + why));
+    }
+}
+
 /// A numpy vector of three [as `v`].
 py::array_t<double> vectorOf(Vec3 v);
 

@@ -85,8 +85,7 @@ public:
     public:
         explicit Use(LiveSession& session, Purpose purpose = Purpose::work);
         ~Use() { session_.busy_.clear(); }
-        Use(const Use&) = delete;
-        Use& operator=(const Use&) = delete;
+        Use& operator=(Use&&) = delete;
 
     private:
         LiveSession& session_;

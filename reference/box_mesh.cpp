@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <ranges>
 
 namespace palpate::reference {
 
@@ -103,9 +105,8 @@ std::vector<double> gradedCells(double low, double fineTo, double high, double f
                  1e3 * fine, 1e3 * low, 1e3 * high, 1e3 * fineTo, growth);
     std::vector<double> ends{low};
     const int even = static_cast<int>(std::ceil((fineTo - low) / fine - 1e-9));
-    for (int i = 1; i <= even; ++i) {
-        ends.push_back(low + (fineTo - low) * i / even);
-    }
+    std::ranges::transform(std::views::iota(1, even + 1), std::back_inserter(ends),
+                           [&](int i) { return low + (fineTo - low) * i / even; });
     if (high - fineTo < 1e-9 * (high - low)) {
         return ends;
     }

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <sstream>
@@ -135,12 +136,9 @@ std::vector<Block> blocksOf(const std::filesystem::path& file, const std::string
             continue;
         }
         std::istringstream words(line);
-        std::vector<double> row;
-        for (double v = 0.0; words >> v;) {
-            row.push_back(v);
-        }
+        const std::vector<double> row{std::istream_iterator<double>(words), {}};
         if (inside && !row.empty()) {
-            blocks.back().push_back(std::move(row));
+            blocks.back().push_back(row);
         }
     }
     return blocks;
@@ -390,10 +388,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
     writeMaterials(out, mesh, materials, NeoHookean{});
     writeShell(out, shell, quadratic.nodes.size(), mesh.tets.size());
     writeMeetable(out, mesh, press);
-    double softest = materials.front().youngsModulus;
-    for (const Material& m : materials) {
-        softest = std::min(softest, m.youngsModulus);
-    }
+    const double softest = std::ranges::min_element(materials, {}, &Material::youngsModulus)->youngsModulus;
     fmt::print(out,
                "*SURFACE INTERACTION, NAME=TOUCH\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{:.12g}\n"
                "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE\nTISSUE,BALL\n*BOUNDARY\n",

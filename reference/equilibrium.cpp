@@ -1,5 +1,7 @@
 #include <reference/equilibrium.h>
 
+#include <base/folds.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -133,11 +135,7 @@ void Equilibrium::weigh(const TetMesh& mesh, std::span<const double> densities, 
 // Of the part that ought to vanish.
 double Equilibrium::unbalanced() const noexcept
 {
-    double sum = 0.0;
-    for (const std::uint32_t i : free) {
-        sum += residual[i] * residual[i];
-    }
-    return std::sqrt(sum);
+    return std::sqrt(base::sumOf(free, [&](std::uint32_t i) { return residual[i] * residual[i]; }));
 }
 
 // Of the forces that hold the body.
@@ -189,11 +187,7 @@ std::vector<double> Equilibrium::direction()
 // Slope of the energy along `step` [uJ].
 double Equilibrium::slope(const std::vector<double>& step) const noexcept
 {
-    double sum = 0.0;
-    for (const std::uint32_t i : free) {
-        sum += residual[i] * step[i];
-    }
-    return sum;
+    return base::sumOf(free, [&](std::uint32_t i) { return residual[i] * step[i]; });
 }
 
 // Goes along Newton's step to about where the energy is least: contact opens and closes along it. With pressures there is

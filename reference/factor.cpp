@@ -56,6 +56,48 @@ void addScaled(double s, std::span<const double> x, std::span<double> y)
     }
 }
 
+// The least-squares problem of GMRES, kept triangular by rotations.
+struct Hessenberg {
+    std::vector<std::vector<double>> columns;
+    std::vector<std::array<double, 2>> turns;
+    std::vector<double> right;
+
+    // Takes column `h`, one longer than the ones before it plus one; gives the residual.
+    double add(std::vector<double> h)
+    {
+        const std::size_t k = columns.size();
+        for (std::size_t i = 0; i < k; ++i) {
+            const auto [c, s] = turns[i];
+            const double low = h[i];
+            h[i] = c * low + s * h[i + 1];
+            h[i + 1] = -s * low + c * h[i + 1];
+        }
+        const double length = std::hypot(h[k], h[k + 1]);
+        const double c = length > 0.0 ? h[k] / length : 1.0;
+        const double s = length > 0.0 ? h[k + 1] / length : 0.0;
+        h[k] = length;
+        h.pop_back();
+        turns.push_back({c, s});
+        right.push_back(-s * right[k]);
+        right[k] *= c;
+        columns.push_back(std::move(h));
+        return std::abs(right.back());
+    }
+
+    std::vector<double> solution() const
+    {
+        std::vector<double> y(columns.size());
+        for (std::size_t i = y.size(); i-- > 0;) {
+            double sum = right[i];
+            for (std::size_t j = i + 1; j < y.size(); ++j) {
+                sum -= columns[j][i] * y[j];
+            }
+            y[i] = columns[i][i] != 0.0 ? sum / columns[i][i] : 0.0;
+        }
+        return y;
+    }
+};
+
 }  // namespace
 
 void SymmetricMatrix::multiply(std::span<const double> x, std::span<double> y) const noexcept
@@ -134,52 +176,6 @@ void Factor::solve(std::span<double> x) const
     impl_->mumps.rhs = x.data();
     impl_->run(substitute);
 }
-
-namespace {
-
-// The least-squares problem of GMRES, kept triangular by rotations.
-struct Hessenberg {
-    std::vector<std::vector<double>> columns;
-    std::vector<std::array<double, 2>> turns;
-    std::vector<double> right;
-
-    // Takes column `h`, one longer than the ones before it plus one; gives the residual.
-    double add(std::vector<double> h)
-    {
-        const std::size_t k = columns.size();
-        for (std::size_t i = 0; i < k; ++i) {
-            const auto [c, s] = turns[i];
-            const double low = h[i];
-            h[i] = c * low + s * h[i + 1];
-            h[i + 1] = -s * low + c * h[i + 1];
-        }
-        const double length = std::hypot(h[k], h[k + 1]);
-        const double c = length > 0.0 ? h[k] / length : 1.0;
-        const double s = length > 0.0 ? h[k + 1] / length : 0.0;
-        h[k] = length;
-        h.pop_back();
-        turns.push_back({c, s});
-        right.push_back(-s * right[k]);
-        right[k] *= c;
-        columns.push_back(std::move(h));
-        return std::abs(right.back());
-    }
-
-    std::vector<double> solution() const
-    {
-        std::vector<double> y(columns.size());
-        for (std::size_t i = y.size(); i-- > 0;) {
-            double sum = right[i];
-            for (std::size_t j = i + 1; j < y.size(); ++j) {
-                sum -= columns[j][i] * y[j];
-            }
-            y[i] = columns[i][i] != 0.0 ? sum / columns[i][i] : 0.0;
-        }
-        return y;
-    }
-};
-
-}  // namespace
 
 bool solveNearby(const SymmetricMatrix& a, const Factor& nearby, std::span<const double> b, std::span<double> x,
                  double fraction, int most)

@@ -211,11 +211,7 @@ Domain domainOf(const SmoothLabels& labels, double least, CGAL::Random& random)
 // Of a facet that is refined, and of a line [mm]; nothing where tetrahedra are wanted too.
 double minOf(const MeshOptions& options, const RegionBounds& bounds)
 {
-    double shortest = options.size;
-    for (const double edge : bounds.edge) {
-        shortest = std::min(shortest, edge);
-    }
-    return options.surfacesOnly ? minFacet * inMillimetres * shortest : 0.0;
+    return options.surfacesOnly ? minFacet * inMillimetres * std::min(options.size, std::ranges::min(bounds.edge)) : 0.0;
 }
 
 Criteria criteriaOf(const MeshOptions& options, const RegionBounds& bounds)

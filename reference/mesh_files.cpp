@@ -34,24 +34,33 @@ constexpr std::size_t perLine = 12;  // numbers of a node set
 
 using Text = std::back_insert_iterator<std::string>;
 
-void fillGrid(const TetMesh& mesh, const volume::TissueTable& table, vtkUnstructuredGrid& grid)
+// Puts nodes and tetrahedra into a grid: of VTK_TETRA or VTK_QUADRATIC_TETRA. Returns the tissue of each.
+template <std::size_t count>
+vtkNew<vtkUnsignedCharArray> addTets(const std::vector<Vec3>& nodes,
+                                     const std::vector<std::array<std::uint32_t, count>>& tets,
+                                     const std::vector<std::uint8_t>& tissues, int type, vtkUnstructuredGrid& grid)
 {
     vtkNew<vtkPoints> points;
     points->SetDataTypeToDouble();
-    for (const Vec3 p : mesh.points) {
+    for (const Vec3 p : nodes) {
         points->InsertNextPoint(p.x, p.y, p.z);
     }
     grid.SetPoints(points);
-    grid.Allocate(static_cast<vtkIdType>(mesh.tets.size()));
+    grid.Allocate(static_cast<vtkIdType>(tets.size()));
     vtkNew<vtkUnsignedCharArray> tissue;
     tissue->SetName("tissue");
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        std::array<vtkIdType, 4> cell{};
-        std::ranges::copy(mesh.tets[t], cell.begin());
-        grid.InsertNextCell(VTK_TETRA, 4, cell.data());
-        tissue->InsertNextValue(mesh.tissue[t]);
+    for (std::size_t t = 0; t < tets.size(); ++t) {
+        std::array<vtkIdType, count> cell{};
+        std::ranges::copy(tets[t], cell.begin());
+        grid.InsertNextCell(type, count, cell.data());
+        tissue->InsertNextValue(tissues[t]);
     }
-    grid.GetCellData()->SetScalars(tissue);
+    return tissue;
+}
+
+void fillGrid(const TetMesh& mesh, const volume::TissueTable& table, vtkUnstructuredGrid& grid)
+{
+    grid.GetCellData()->SetScalars(addTets(mesh.points, mesh.tets, mesh.tissue, VTK_TETRA, grid));
     vtkNew<vtkStringArray> names;
     names->SetName("tissue_names");
     for (const auto& row : table.rows) {
@@ -232,25 +241,6 @@ Maker makerOf(const std::filesystem::path& file)
     return found->second;
 }
 
-}  // namespace
-
-std::string meshFileEndings()
-{
-    return ".vtu, .vtk, .msh or .inp";
-}
-
-void checkMeshFile(const std::filesystem::path& file)
-{
-    makerOf(file);
-}
-
-std::string meshText(const TetMesh& mesh, const volume::TissueTable& table, const std::filesystem::path& file)
-{
-    return makerOf(file)(mesh, table);
-}
-
-namespace {
-
 // VTK stores xx yy zz xy yz xz, the solver xx yy zz yz xz xy.
 constexpr std::array<std::size_t, 6> stressOrder{0, 1, 2, 5, 3, 4};
 
@@ -280,25 +270,26 @@ vtkNew<vtkDoubleArray> stressOf(const Solver& solver)
 
 }  // namespace
 
+std::string meshFileEndings()
+{
+    return ".vtu, .vtk, .msh or .inp";
+}
+
+void checkMeshFile(const std::filesystem::path& file)
+{
+    makerOf(file);
+}
+
+std::string meshText(const TetMesh& mesh, const volume::TissueTable& table, const std::filesystem::path& file)
+{
+    return makerOf(file)(mesh, table);
+}
+
 std::string vtuText(const TetMesh& mesh, const Solver& solver)
 {
     const QuadraticMesh q(mesh);
-    vtkNew<vtkPoints> points;
-    points->SetDataTypeToDouble();
-    for (const Vec3 p : q.nodes) {
-        points->InsertNextPoint(p.x, p.y, p.z);
-    }
     vtkNew<vtkUnstructuredGrid> grid;
-    grid->SetPoints(points);
-    grid->Allocate(static_cast<vtkIdType>(q.tets.size()));
-    vtkNew<vtkUnsignedCharArray> tissue;
-    tissue->SetName("tissue");
-    for (std::size_t t = 0; t < q.tets.size(); ++t) {
-        std::array<vtkIdType, 10> cell{};
-        std::ranges::copy(q.tets[t], cell.begin());
-        grid->InsertNextCell(VTK_QUADRATIC_TETRA, 10, cell.data());
-        tissue->InsertNextValue(mesh.tissue[t]);
-    }
+    const auto tissue = addTets(q.nodes, q.tets, mesh.tissue, VTK_QUADRATIC_TETRA, *grid);
     grid->GetPointData()->SetVectors(displacementOf(solver.displacement(q.nodes)));
     grid->GetCellData()->AddArray(stressOf(solver));
     grid->GetCellData()->AddArray(tissue);

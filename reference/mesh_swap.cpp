@@ -1,5 +1,6 @@
 #include <reference/mesh_swap.h>
 
+#include <base/folds.h>
 #include <reference/mesh_parts.h>
 #include <reference/mesh_quality.h>
 
@@ -317,10 +318,8 @@ private:
                 after += sixVolumes(mesh_, tet);
             }
         }
-        double longest = 0.0;
-        for (const std::uint32_t r : of) {
-            longest = std::max(longest, glm::distance(mesh_.points[p], mesh_.points[r]));
-        }
+        const double longest =
+            base::largestOf(of, [&](std::uint32_t r) { return glm::distance(mesh_.points[p], mesh_.points[r]); });
         const double most = tissues.test(256) ? outsideChange * longest * longest * longest : unchanged * before;
         if (std::abs(after - before) > most) {
             return false;
@@ -389,10 +388,8 @@ private:
 std::size_t swapBad(TetMesh& mesh, double target)
 {
     Swapper swapper(mesh);
-    std::size_t changes = 0;
-    for (const std::uint32_t t : swapper.bad(target)) {
-        changes += swapper.mend(t, target) ? 1U : 0U;
-    }
+    const auto changes = static_cast<std::size_t>(
+        std::ranges::count_if(swapper.bad(target), [&](std::uint32_t t) { return swapper.mend(t, target); }));
     swapper.finish();
     dropUnusedPoints(mesh);
     return changes;

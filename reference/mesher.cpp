@@ -91,58 +91,6 @@ bool leavesOut(const SmoothLabels& labels, const TetMesh& mesh, std::size_t tet)
     });
 }
 
-}  // namespace
-
-Mixtures mixTissues(const SmoothLabels& labels, const volume::TissueTable& table, TetMesh& mesh)
-{
-    SmoothLabels all = labels;
-    all.within.clear();
-    std::vector<double> ofRow(table.rows.size(), 0.0);
-    std::map<long, Bucket> buckets;
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        const double volume = sixVolumes(mesh, t) / 6.0;
-        const auto fractions = leavesOut(labels, mesh, t) ? sharesIn(all, mesh, t) : std::vector<double>();
-        const auto most = std::ranges::max_element(fractions);
-        if (most == fractions.end() || *most == 0.0) {
-            ofRow[mesh.tissue[t]] += volume;
-            continue;
-        }
-        if (*most >= whole) {
-            mesh.tissue[t] = labels.rows[static_cast<std::size_t>(most - fractions.begin())];
-            ofRow[mesh.tissue[t]] += volume;
-            continue;
-        }
-        for (std::size_t r = 0; r < fractions.size(); ++r) {
-            ofRow[labels.rows[r]] += fractions[r] * volume;
-        }
-        const Material m = mixed(labels, table, fractions);
-        Bucket& bucket = buckets[std::lround(std::log(m.youngsModulus) / rounding)];
-        bucket.tets.push_back(t);
-        bucket.volume += volume;
-        bucket.sum.youngsModulus += volume * std::log(m.youngsModulus);
-        bucket.sum.poisson += volume * m.poisson;
-        bucket.sum.stiffening += volume * m.stiffening;
-    }
-    const std::size_t materials = table.rows.size() + buckets.size();
-    base::failIf(
-        materials > mostMaterials,
-        "volume: {} rows of the tissue table and {} mixtures of thin tissues are more than {} materials: leave out "
-        "rows that the volume does not need",
-        table.rows.size(), buckets.size(), mostMaterials);
-    Mixtures out;
-    for (const auto& [step, bucket] : buckets) {
-        for (const std::size_t t : bucket.tets) {
-            mesh.tissue[t] = static_cast<std::uint8_t>(table.rows.size() + out.materials.size());
-        }
-        out.materials.push_back({std::exp(bucket.sum.youngsModulus / bucket.volume), bucket.sum.poisson / bucket.volume,
-                                 bucket.sum.stiffening / bucket.volume});
-    }
-    std::ranges::transform(labels.rows, std::back_inserter(out.volume), [&](std::uint8_t row) { return ofRow[row]; });
-    return out;
-}
-
-namespace {
-
 constexpr double volumeTolerance = 2e-3;  // of a region, below which it is not corrected
 constexpr double minSeed = 0.5;           // volume of a piece worth a seed, in cubes of the edge length there
 
@@ -268,6 +216,54 @@ private:
 };
 
 }  // namespace
+
+Mixtures mixTissues(const SmoothLabels& labels, const volume::TissueTable& table, TetMesh& mesh)
+{
+    SmoothLabels all = labels;
+    all.within.clear();
+    std::vector<double> ofRow(table.rows.size(), 0.0);
+    std::map<long, Bucket> buckets;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        const double volume = sixVolumes(mesh, t) / 6.0;
+        const auto fractions = leavesOut(labels, mesh, t) ? sharesIn(all, mesh, t) : std::vector<double>();
+        const auto most = std::ranges::max_element(fractions);
+        if (most == fractions.end() || *most == 0.0) {
+            ofRow[mesh.tissue[t]] += volume;
+            continue;
+        }
+        if (*most >= whole) {
+            mesh.tissue[t] = labels.rows[static_cast<std::size_t>(most - fractions.begin())];
+            ofRow[mesh.tissue[t]] += volume;
+            continue;
+        }
+        for (std::size_t r = 0; r < fractions.size(); ++r) {
+            ofRow[labels.rows[r]] += fractions[r] * volume;
+        }
+        const Material m = mixed(labels, table, fractions);
+        Bucket& bucket = buckets[std::lround(std::log(m.youngsModulus) / rounding)];
+        bucket.tets.push_back(t);
+        bucket.volume += volume;
+        bucket.sum.youngsModulus += volume * std::log(m.youngsModulus);
+        bucket.sum.poisson += volume * m.poisson;
+        bucket.sum.stiffening += volume * m.stiffening;
+    }
+    const std::size_t materials = table.rows.size() + buckets.size();
+    base::failIf(
+        materials > mostMaterials,
+        "volume: {} rows of the tissue table and {} mixtures of thin tissues are more than {} materials: leave out "
+        "rows that the volume does not need",
+        table.rows.size(), buckets.size(), mostMaterials);
+    Mixtures out;
+    for (const auto& [step, bucket] : buckets) {
+        for (const std::size_t t : bucket.tets) {
+            mesh.tissue[t] = static_cast<std::uint8_t>(table.rows.size() + out.materials.size());
+        }
+        out.materials.push_back({std::exp(bucket.sum.youngsModulus / bucket.volume), bucket.sum.poisson / bucket.volume,
+                                 bucket.sum.stiffening / bucket.volume});
+    }
+    std::ranges::transform(labels.rows, std::back_inserter(out.volume), [&](std::uint8_t row) { return ofRow[row]; });
+    return out;
+}
 
 double edgeLength(const MeshOptions& options, Vec3 p) noexcept
 {

@@ -1,5 +1,7 @@
 #include <reference/sharp_edges.h>
 
+#include <base/mapped.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -48,9 +50,7 @@ public:
     void markCorners()
     {
         degree_.clear();
-        for (const auto& n : neighbours_) {
-            degree_.push_back(n.size());
-        }
+        degree_ = base::mapped<std::size_t>(neighbours_, &std::vector<std::size_t>::size);
     }
 
 private:

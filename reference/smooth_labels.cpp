@@ -1,5 +1,6 @@
 #include <reference/smooth_labels.h>
 
+#include <base/folds.h>
 #include <reference/soft_voxels.h>
 
 #include <glm/common.hpp>
@@ -272,10 +273,7 @@ void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
 {
     std::vector<double> margins;
     for (std::size_t p = 0; p + 1 < points.first.size(); ++p) {
-        double sum = 0.0;
-        for (const auto& s : points.at(p)) {
-            sum += s.fraction;
-        }
+        const double sum = base::sumOf(points.at(p), [](const auto& s) { return s.fraction; });
         margins.push_back(sum - 0.5 + labels.bodyBias);
     }
     const double inner = std::accumulate(points.inner.begin(), points.inner.end(), 0.0);
@@ -363,12 +361,9 @@ void fitVolumes(SmoothLabels& labels, std::span<const double> wanted)
     // Biases mean nothing but against each other: the largest region keeps its own.
     labels.largest = static_cast<int>(std::max_element(wanted.begin(), wanted.end()) - wanted.begin());
     // Small ones first, which the blur took most from: what they take is then no longer the large ones' to give away.
-    std::vector<std::size_t> order;
-    for (std::size_t row = 0; row < labels.rows.size(); ++row) {
-        if (row != static_cast<std::size_t>(labels.largest)) {
-            order.push_back(row);
-        }
-    }
+    std::vector<std::size_t> order(labels.rows.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::erase(order, static_cast<std::size_t>(labels.largest));
     std::ranges::sort(order, {}, [&](std::size_t row) { return wanted[row]; });
     for (int pass = 0; pass < fitPasses; ++pass) {
         for (const std::size_t row : order) {

@@ -3,6 +3,7 @@
 #include <base/error.h>
 
 #include <glm/common.hpp>
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/vector_relational.hpp>
 
 #include <algorithm>
@@ -91,10 +92,7 @@ SoftVoxels readVoxels(const volume::Tissue& tissue, Keep keep)
 
 int layOnItsBack(const volume::Affine& affine, SoftVoxels& voxels)
 {
-    int axis = 0;
-    for (int a = 1; a < 3; ++a) {
-        axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
-    }
+    const int axis = volume::longestAxis(glm::row(affine.linear, 1));
     base::failIf(
         voxels.size[axis] < 2,
         "volume: it is one voxel thick from front to back and nothing holds it: its rear layer, which would be held, "

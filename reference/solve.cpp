@@ -1,6 +1,8 @@
 #include <reference/solve.h>
 
 #include <base/error.h>
+#include <base/folds.h>
+#include <base/mapped.h>
 #include <base/units.h>
 #include <reference/equilibrium.h>
 #include <reference/groups.h>
@@ -66,6 +68,25 @@ void checkOneBody(const TetMesh& mesh)
     }
     base::failIf(apart > 0, "mesh: {} of {} tetrahedra are not connected with the first one: keep one body", apart,
                  mesh.tets.size());
+}
+
+// Calls step(to) for shares of a load from 0 to 1, shorter where it fails; longer where it was `easy`.
+// @param length  of the first step, and then of the next one
+// @returns  how far it got
+template <typename Step, typename Easy>
+double takeSteps(double& length, int most, Step&& step, Easy&& easy)
+{
+    double done = 0.0;
+    for (int count = 0; done < 1.0 && length >= shortest && count < most; ++count) {
+        const double to = done + length > 1.0 - shortest ? 1.0 : done + length;
+        if (step(to)) {
+            done = to;
+            length *= easy() ? 1.5 : 1.0;
+        } else {
+            length *= 0.5;
+        }
+    }
+    return done;
 }
 
 }  // namespace
@@ -291,29 +312,6 @@ Solver::Solver(const TetMesh& mesh, std::span<const Material> materials, const S
 
 Solver::~Solver() = default;
 
-namespace {
-
-// Calls step(to) for shares of a load from 0 to 1, shorter where it fails; longer where it was `easy`.
-// @param length  of the first step, and then of the next one
-// @returns  how far it got
-template <typename Step, typename Easy>
-double takeSteps(double& length, int most, Step&& step, Easy&& easy)
-{
-    double done = 0.0;
-    for (int count = 0; done < 1.0 && length >= shortest && count < most; ++count) {
-        const double to = done + length > 1.0 - shortest ? 1.0 : done + length;
-        if (step(to)) {
-            done = to;
-            length *= easy() ? 1.5 : 1.0;
-        } else {
-            length *= 0.5;
-        }
-    }
-    return done;
-}
-
-}  // namespace
-
 double RigidTool::distance(Vec3 p) const noexcept
 {
     return Obstacle{centre, radius, shaft}.distance(p);  // in whatever unit its lengths are
@@ -364,10 +362,8 @@ void Solver::prescribe(const Patch& patch)
     double length = 1.0;
     const auto step = [&](double fraction) {
         const std::vector<double> state = s.body.state;
-        s.body.goal.clear();
-        for (const std::uint32_t i : s.body.driven) {
-            s.body.goal.push_back(fraction * goal[i]);
-        }
+
+        s.body.goal = base::mapped<double>(s.body.driven, [&](std::uint32_t i) { return fraction * goal[i]; });
         if (s.body.find(s.body.options.tolerance)) {
             s.say(fraction);
             return true;
@@ -377,10 +373,7 @@ void Solver::prescribe(const Patch& patch)
     };
     const double done = takeSteps(length, s.body.options.maxSteps, step, [] { return true; });
     if (done < 1.0) {
-        double largest = 0.0;
-        for (const double g : goal) {
-            largest = std::max(largest, std::abs(g));
-        }
+        const double largest = base::largestOf(goal, [](double g) { return std::abs(g); });
         throw base::error(
             "patch: does not converge at {:.3f} mm of {:.3f} mm: prescribe less, or make "
             "the elements smaller there",

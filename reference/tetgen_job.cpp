@@ -13,6 +13,15 @@ class Writer {
 public:
     explicit Writer(const std::filesystem::path& file) : file_(file), out_(file, std::ios::binary) {}
 
+    // All parts of the file, which is whole then.
+    void finish(const auto&... parts)
+    {
+        (put(parts), ...);
+        out_.close();
+        base::failIf(!out_, "{}: cannot be written: is the disk full?", file_.native());
+    }
+
+private:
     template <typename T>
     void put(const T& value)
     {
@@ -26,13 +35,6 @@ public:
         out_.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
     }
     void put(const std::string& text) { put(std::vector<char>(text.begin(), text.end())); }
-    void finish()
-    {
-        out_.close();
-        base::failIf(!out_, "{}: cannot be written: is the disk full?", file_.native());
-    }
-
-private:
     std::filesystem::path file_;
     std::ofstream out_;
 };
@@ -45,18 +47,21 @@ public:
         check();
     }
 
+    void take(auto&... parts) { (takeOne(parts), ...); }
+
+private:
     template <typename T>
-    void take(T& value)
+    void takeOne(T& value)
     {
         static_assert(std::is_trivially_copyable_v<T>);
         in_.read(reinterpret_cast<char*>(&value), sizeof value);
         check();
     }
     template <typename T>
-    void take(std::vector<T>& values)
+    void takeOne(std::vector<T>& values)
     {
         std::size_t count = 0;
-        take(count);
+        takeOne(count);
         if (count > bytes_ / sizeof(T)) {
             in_.setstate(std::ios::failbit);
             check();
@@ -66,14 +71,13 @@ public:
         check();
     }
 
-    void take(std::string& text)
+    void takeOne(std::string& text)
     {
         std::vector<char> bytes;
-        take(bytes);
+        takeOne(bytes);
         text.assign(bytes.begin(), bytes.end());
     }
 
-private:
     void check() const { base::failIf(!in_, "{}: is no whole job of TetGen's", file_.native()); }
 
     std::filesystem::path file_;
@@ -85,45 +89,25 @@ private:
 
 void write(const std::filesystem::path& file, const TetGenJob& job)
 {
-    Writer out(file);
-    out.put(job.switches);
-    out.put(job.points);
-    out.put(job.facets);
-    out.put(job.regions);
-    out.finish();
+    Writer(file).finish(job.switches, job.points, job.facets, job.regions);
 }
 
 void write(const std::filesystem::path& file, const TetGenResult& result)
 {
-    Writer out(file);
-    out.put(result.error);
-    out.put(result.points);
-    out.put(result.tets);
-    out.put(result.region);
-    out.put(result.faces);
-    out.finish();
+    Writer(file).finish(result.error, result.points, result.tets, result.region, result.faces);
 }
 
 TetGenJob readJob(const std::filesystem::path& file)
 {
     TetGenJob job;
-    Reader in(file);
-    in.take(job.switches);
-    in.take(job.points);
-    in.take(job.facets);
-    in.take(job.regions);
+    Reader(file).take(job.switches, job.points, job.facets, job.regions);
     return job;
 }
 
 TetGenResult readResult(const std::filesystem::path& file)
 {
     TetGenResult result;
-    Reader in(file);
-    in.take(result.error);
-    in.take(result.points);
-    in.take(result.tets);
-    in.take(result.region);
-    in.take(result.faces);
+    Reader(file).take(result.error, result.points, result.tets, result.region, result.faces);
     return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <base/child_process.h>
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/temporary_folder.h>
 #include <base/units.h>
 #include <reference/mesh_parts.h>
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <stdexcept>
 
 namespace palpate::reference {
@@ -92,10 +94,8 @@ TetMesh meshOf(const TetGenResult& result, const Surfaces& surfaces)
         mesh.tissue.push_back(surfaces.seeds[static_cast<std::size_t>(result.region[t] - 1)].tissue);
     }
     // TetGen turns its tetrahedra the other way round. All alike: one that is flipped stays so, and is found.
-    double sum = 0.0;
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        sum += sixVolumes(mesh, t);
-    }
+    const double sum =
+        base::sumOf(std::views::iota(0UL, mesh.tets.size()), [&](std::size_t t) { return sixVolumes(mesh, t); });
     if (sum < 0.0) {
         for (auto& tet : mesh.tets) {
             std::swap(tet[2], tet[3]);

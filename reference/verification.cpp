@@ -1,5 +1,7 @@
 #include <reference/verification.h>
 
+#include <base/folds.h>
+#include <base/mapped.h>
 #include <reference/box_mesh.h>
 #include <reference/solve.h>
 #include <studies/accuracy/elastic_formulas.h>
@@ -7,8 +9,11 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <ranges>
 #include <utility>
 
 namespace palpate::reference {
@@ -37,11 +42,7 @@ SolveOptions mirroredIn(std::array<bool, 3> planes, Law law, Elements elements)
 
 std::vector<double> even(double high, int cells)
 {
-    std::vector<double> ends;
-    for (int i = 0; i <= cells; ++i) {
-        ends.push_back(high * i / cells);
-    }
-    return ends;
+    return base::mapped<double>(std::views::iota(0, cells + 1), [&](int i) { return high * i / cells; });
 }
 
 VerificationRow rowOf(const char* problem, const char* quantity, double ours, double reference, double bound)
@@ -73,10 +74,7 @@ double relativeError(const Solver& solver, const std::vector<Vec3>& points, cons
 
 double meanSize(const std::vector<Vec3>& points, const std::function<Vec3(Vec3)>& exact)
 {
-    double sum = 0.0;
-    for (const Vec3& p : points) {
-        sum += glm::dot(exact(p), exact(p));
-    }
+    const double sum = base::sumOf(points, [&](Vec3 p) { return glm::dot(exact(p), exact(p)); });
     return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
@@ -236,11 +234,7 @@ Rows spheres(Fineness fineness)
          {"sphere on a bonded layer, chi 0.125", 8e-3, 0.45, Elements::p2, bonded(0.45, 8e-3), "Dimitriadis et al. 2002"},
          {"sphere on a bonded layer, chi 0.25", 4e-3, 0.4999, Elements::p2p1, studies::incompressibleLayerFactor(0.25),
           "Garcia, Garcia 2018"}}};
-    Rows rows;
-    for (const SphereCase& c : cases) {
-        rows.push_back(sphere(c, radius, depth, fineness));
-    }
-    return rows;
+    return base::mapped<VerificationRow>(cases, [&](const SphereCase& c) { return sphere(c, radius, depth, fineness); });
 }
 
 VerificationRow punch(double perThickness, double poisson, Fineness fineness)
@@ -282,9 +276,7 @@ Rows punches(Fineness fineness)
                                                                       : std::vector<double>{0.05, 0.2, 0.4, 0.6, 0.8, 1.0};
     Rows rows;
     for (const double poisson : {0.3, 0.45}) {
-        for (const double fraction : fractions) {
-            rows.push_back(punch(fraction, poisson, fineness));
-        }
+        std::ranges::transform(fractions, std::back_inserter(rows), [&](double f) { return punch(f, poisson, fineness); });
     }
     return rows;
 }

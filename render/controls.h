@@ -35,8 +35,7 @@ public:
     /// Listens to `window` until it is destroyed. All must outlive that.
     Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture, const Follower& follower,
              const ViewerOptions& options);
-    Controls(const Controls&) = delete;
-    Controls& operator=(const Controls&) = delete;
+    Controls& operator=(Controls&&) = delete;
 
     /// To be called after every look at the follower.
     void keep();

@@ -18,8 +18,7 @@ class PrivateDisplay {
 public:
     /// Starts it and points DISPLAY and XAUTHORITY at it. Throws std::runtime_error where Xvfb is not installed or fails.
     PrivateDisplay();
-    PrivateDisplay(const PrivateDisplay&) = delete;
-    PrivateDisplay& operator=(const PrivateDisplay&) = delete;
+    PrivateDisplay& operator=(PrivateDisplay&&) = delete;
     ~PrivateDisplay();
 
 private:

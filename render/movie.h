@@ -17,8 +17,7 @@ public:
 
     /// Throws std::runtime_error where ffmpeg is not installed. The window's size must not change.
     MovieFile(std::filesystem::path file, vtkRenderWindow& window);
-    MovieFile(const MovieFile&) = delete;
-    MovieFile& operator=(const MovieFile&) = delete;
+    MovieFile& operator=(MovieFile&&) = delete;
     ~MovieFile();
 
     /// The window as it is drawn, for so many frames. Throws std::runtime_error when ffmpeg has ended.

@@ -9,8 +9,7 @@ namespace palpate::render {
 class SpaceMouse {
 public:
     SpaceMouse();
-    SpaceMouse(const SpaceMouse&) = delete;
-    SpaceMouse& operator=(const SpaceMouse&) = delete;
+    SpaceMouse& operator=(SpaceMouse&&) = delete;
     ~SpaceMouse();
 
     bool connected() const noexcept { return connected_; }

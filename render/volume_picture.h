@@ -37,8 +37,7 @@ std::uint8_t byteOf(float part) noexcept;
 class VolumePicture {
 public:
     VolumePicture(const channel::Scenery& scenery, const Deformation& deformation, vtkRenderer& renderer);
-    VolumePicture(const VolumePicture&) = delete;
-    VolumePicture& operator=(const VolumePicture&) = delete;
+    VolumePicture& operator=(VolumePicture&&) = delete;
     ~VolumePicture();
 
     /// Shows the present deformation from the next prepare() on.

@@ -1,5 +1,6 @@
 #include <report/data.h>
 
+#include <base/mapped.h>
 #include <base/quantiles.h>
 #include <base/words.h>
 #include <glm/geometric.hpp>
@@ -260,9 +261,7 @@ ReportData collect(const haptics::Record& record)
     Collector c(record.info(), record.ticks());
     record.each([&](const haptics::TickRecord& tick) { c.add(tick); });
     c.data.score = c.watch.score();
-    for (const Vec3& mark : c.watch.marks()) {
-        c.data.marks.push_back(mark * 1e3);
-    }
+    c.data.marks = base::mapped<Vec3>(c.watch.marks(), [](Vec3 mark) { return mark * 1e3; });
     const base::English page;  // all of it is
     c.data.losses = c.watch.losses(record.info());
     c.data.forces = c.forces.finish();

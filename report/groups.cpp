@@ -1,6 +1,7 @@
 #include <report/groups.h>
 
 #include <base/counted.h>
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/round_step.h>
@@ -84,10 +85,8 @@ Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& me
 bool constant(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
     const std::vector<double> all = allRounded(groups, measure);
-    std::size_t sessions = 0;
-    for (const ScoredGroup& g : groups) {
-        sessions += g.sessions.size();
-    }
+    const auto sessions = base::sumOf(
+        groups, [](const auto& g) { return g.sessions.size(); }, std::size_t{0});
     const bool same = std::ranges::all_of(all, [&](double v) { return v == all.front(); });
     return same && (all.size() == sessions || all.empty() || std::isinf(all.front()));
 }
@@ -183,12 +182,8 @@ std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& 
 std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& measure)
 {
     const auto column = static_cast<std::size_t>(&measure - haptics::measures().data());
-    std::vector<double> values;
-    for (const std::vector<double>& session : group.sessions) {
-        if (!std::isnan(session[column])) {
-            values.push_back(session[column]);
-        }
-    }
+    auto values = base::mapped<double>(group.sessions, [&](const auto& session) { return session[column]; });
+    std::erase_if(values, [](double value) { return std::isnan(value); });
     return values;
 }
 

@@ -30,10 +30,7 @@ Vec3 direction(const volume::Affine& affine, int axis)
 std::string towards(Vec3 d)
 {
     static constexpr const char* names[3][2] = {{"right", "left"}, {"front", "back"}, {"feet", "head"}};
-    int axis = 0;
-    for (int a = 1; a < 3; ++a) {
-        axis = std::abs(d[a]) > std::abs(d[axis]) ? a : axis;
-    }
+    const int axis = volume::longestAxis(d);
     const bool oblique = std::abs(d[axis]) < 0.9999;
     return fmt::format("{}{}", names[axis][d[axis] > 0 ? 1 : 0], oblique ? " (oblique)" : "");
 }

@@ -43,8 +43,7 @@ public:
     /// Throws std::runtime_error for a time that the record does not have and for forces that are not the record's.
     DeformedState(const std::string& file, double at, const std::function<void(double)>& progress);
 
-    DeformedState(const DeformedState&) = delete;
-    DeformedState& operator=(const DeformedState&) = delete;
+    DeformedState& operator=(DeformedState&&) = delete;
 
     std::uint64_t tick() const noexcept { return tick_; }                   // of the record
     const haptics::SessionModel& model() const noexcept { return model_; }  // of the record

@@ -1,6 +1,7 @@
 #include <session/devices.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <haptics/falcon/device.h>
 #include <haptics/hand.h>
 #include <haptics/mouse.h>
@@ -11,6 +12,7 @@
 #include <haptics/trigger.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -127,11 +129,10 @@ void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
 
 std::string devicesInWords()
 {
-    std::string words;
-    for (const DeviceKind& kind : deviceKinds()) {
-        words += fmt::format("{}{}{}", words.empty() ? "" : ", ", kind.name.empty() ? "or " : "", kind.what);
-    }
-    return words;
+    const auto words = base::mapped<std::string>(deviceKinds(), [](const DeviceKind& kind) {
+        return fmt::format("{}{}", kind.name.empty() ? "or " : "", kind.what);
+    });
+    return fmt::format("{}", fmt::join(words, ", "));
 }
 
 std::span<const DeviceKind> deviceKinds() noexcept

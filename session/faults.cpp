@@ -1,6 +1,7 @@
 #include <session/faults.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/quantities.h>
 #include <haptics/simulation.h>
 
@@ -126,8 +127,7 @@ public:
         setrlimit(RLIMIT_FSIZE, &limit);
     }
     ~NoRoom() { setrlimit(RLIMIT_FSIZE, &before_); }
-    NoRoom(const NoRoom&) = delete;
-    NoRoom& operator=(const NoRoom&) = delete;
+    NoRoom& operator=(NoRoom&&) = delete;
 
 private:
     rlimit before_{};
@@ -153,11 +153,9 @@ bool has(const Faults& faults, FaultKind kind) noexcept
 
 double gapAfter(const Faults& faults, std::uint64_t tick) noexcept
 {
-    double seconds = 0.0;
-    for (const Fault& fault : faults) {
-        seconds += fault.kind == FaultKind::gap && ticksOf(fault.start) == tick ? fault.length : 0.0;
-    }
-    return seconds;
+    return base::sumOf(faults, [&](const Fault& fault) {
+        return fault.kind == FaultKind::gap && ticksOf(fault.start) == tick ? fault.length : 0.0;
+    });
 }
 
 FaultyDevice::FaultyDevice(std::unique_ptr<haptics::Device> device, Faults faults)

@@ -1,5 +1,7 @@
 #include <session/figures.h>
 
+#include <base/mapped.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -70,13 +72,10 @@ nlohmann::json scoreFigures(const haptics::Score& score, const std::vector<hapti
     for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
         out["points"][part.key] = points.*part.points;
     }
-    out["losses"] = nlohmann::json::array();
-    for (const haptics::Loss& loss : losses) {
-        out["losses"].push_back({{"measure", loss.measure},
-                                 {"points", loss.points},
-                                 {"words", loss.words},
-                                 {"at_s", loss.at ? nlohmann::json(*loss.at) : nlohmann::json()}});
-    }
+    out["losses"] = base::mapped<nlohmann::json>(losses, [](const haptics::Loss& loss) -> nlohmann::json {
+        const auto at = loss.at ? nlohmann::json(*loss.at) : nlohmann::json();
+        return {{"measure", loss.measure}, {"points", loss.points}, {"words", loss.words}, {"at_s", at}};
+    });
     return out;
 }
 

@@ -128,22 +128,6 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
     return again;
 }
 
-Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissue, const SceneChanges& changes)
-{
-    return datasets::sceneForVolume(std::filesystem::absolute(file), tissue, changes.target.value_or(""));
-}
-
-}  // namespace
-
-volume::Tissue loadVolume(const std::filesystem::path& file)
-{
-    std::error_code none;
-    base::failIf(std::filesystem::is_directory(file, none), "{}: is a folder: give a volume (.vdb)", file.native());
-    return volume::Tissue::load(file);
-}
-
-namespace {
-
 // The volume with the lesion of --lesion-from in it, which becomes the target where no other is asked for.
 volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
 {
@@ -168,7 +152,20 @@ void refuseNoScene(const std::filesystem::path& file)
                  "{}: is no scene: 'palpate import' makes a volume (.vdb) of a label map first", file.native());
 }
 
+std::string hostName()
+{
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
 }  // namespace
+
+volume::Tissue loadVolume(const std::filesystem::path& file)
+{
+    std::error_code none;
+    base::failIf(std::filesystem::is_directory(file, none), "{}: is a folder: give a volume (.vdb)", file.native());
+    return volume::Tissue::load(file);
+}
 
 haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
 {
@@ -183,7 +180,8 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
             changes.target = datasets::largestStructure(*tissue);
             base::failIf(changes.target->empty(), "{}: the volume holds no tissue, only air: import one with tissue", what);
         }
-        auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
+        auto scene = changed(
+            datasets::sceneForVolume(std::filesystem::absolute(path), *tissue, changes.target.value_or("")), changes, what);
         auto model = haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
         model.approach.isPlanned = model.approach.isPlanned && aims;
         return model;
@@ -232,16 +230,6 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
     base::failIf(!contradiction.empty(), "{}: was changed: {}", file, contradiction);
     return model;
 }
-
-namespace {
-
-std::string hostName()
-{
-    std::array<char, 256> name{};
-    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
-}
-
-}  // namespace
 
 void startHere(haptics::SessionInfo& info)
 {

@@ -166,10 +166,9 @@ void checkKind(const Section& section, ProcedureKind kind)
 {
     const auto keys = keysOf(kind);
     for (const std::string& key : section.keys()) {
-        if (key != "kind" && std::ranges::find(keys, key) == keys.end()) {
-            section.refuse(key, fmt::format("a procedure of kind {} has the keys {}",
-                                            procedureNames[static_cast<std::size_t>(kind)], fmt::join(keys, ", ")));
-        }
+        section.refuseIf(key != "kind" && std::ranges::find(keys, key) == keys.end(), key,
+                         fmt::format("a procedure of kind {} has the keys {}",
+                                     procedureNames[static_cast<std::size_t>(kind)], fmt::join(keys, ", ")));
     }
 }
 
@@ -258,10 +257,7 @@ KeyValue Axis::at(double unit) const
         return values[std::min(index, values.size() - 1)];
     }
     const double value = log ? low * std::pow(high / low, unit) : low + unit * (high - low);
-    if (whole) {
-        return static_cast<std::int64_t>(std::llround(value));
-    }
-    return value;
+    return whole ? KeyValue(static_cast<std::int64_t>(std::llround(value))) : value;
 }
 
 KeyValue Axis::level(std::size_t index) const

@@ -306,9 +306,8 @@ void report(const SweepArguments& o)
 {
     const SweepFolder folder(o.report, "", false);
     const auto rows = folder.rows();
-    if (std::ranges::none_of(rows, [](const auto& r) { return r && !r->failed(); })) {
-        throw std::runtime_error(o.report + ": no case is done yet: run the sweep first");
-    }
+    base::failIf(std::ranges::none_of(rows, [](const auto& r) { return r && !r->failed(); }),
+                 "{}: no case is done yet: run the sweep first", o.report);
     const fs::path file = folder.path() / "report.html";
     base::writeWhole(file, sweepPage(folder.plan(), rows));
     command::writeJson(o.json, sensitivity(folder.plan(), rows));
@@ -350,11 +349,7 @@ void addParts(CLI::App& c, SweepArguments& o)
         "--merge",
         [&o](const std::vector<std::string>& folders) {
             o.merge = true;
-            for (const std::string& folder : folders) {
-                if (!folder.empty()) {
-                    o.merged.push_back(folder);
-                }
-            }
+            std::ranges::remove_copy(folders, std::back_inserter(o.merged), "");
         },
         "Merge the results of shards, in DIR/shards and in these folders, into one table");
     merge->expected(0, CLI::detail::expected_max_vector_size)->type_name("[DIR..]")->excludes(shard)->excludes(cases);

@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <set>
 
 namespace palpate::sweep {
@@ -52,12 +54,10 @@ json rowsOf(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& r
             continue;
         }
         json row = json::array();
-        for (const auto& p : sweepPoint(plan, i).parameters) {
-            row.push_back(valueOf(p));
-        }
-        for (const double v : rows[i]->outputs) {
-            row.push_back(std::isfinite(v) ? json(v) : json());
-        }
+        std::ranges::transform(sweepPoint(plan, i).parameters, std::back_inserter(row),
+                               [](const auto& p) { return valueOf(p); });
+        std::ranges::transform(rows[i]->outputs, std::back_inserter(row),
+                               [](double v) { return std::isfinite(v) ? json(v) : json(); });
         out.push_back(std::move(row));
     }
     return out;
@@ -142,17 +142,13 @@ std::string body(const SweepPlan& plan, const std::vector<std::optional<SweepRow
 
 std::string sweepPage(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows)
 {
+    const auto markData = [](const auto& m) -> json { return {{"output", m.output}, {"at", m.at}, {"label", m.label}}; };
     json data{{"axes", axesOf(plan)},
-              {"outputs", json::array()},
-              {"marks", json::array()},
+              {"outputs", base::mapped<json>(plan.outputs, [](const auto& o) { return json(o.name); })},
+              {"marks", base::mapped<json>(plan.marks, markData)},
               {"rows", rowsOf(plan, rows)},
               {"sensitivity", sensitivity(plan, rows)}};
-    for (const auto& o : plan.outputs) {
-        data["outputs"].push_back(o.name);
-    }
-    for (const auto& m : plan.marks) {
-        data["marks"].push_back({{"output", m.output}, {"at", m.at}, {"label", m.label}});
-    }
+
     std::string out =
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
         "content=\"width=device-width, initial-scale=1\"><title>" +

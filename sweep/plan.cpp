@@ -1,6 +1,7 @@
 #include <sweep/plan.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/embedded.h>
 #include <datasets/scene_text.h>
 #include <datasets/toml_section.h>
@@ -14,7 +15,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <ranges>
 #include <set>
 #include <stdexcept>
 
@@ -64,14 +67,11 @@ Axis readAxis(Section& section, DesignKind design)
     Axis axis;
     axis.key = section.word("key").value_or("");
     axis.name = section.word("name").value_or(columnOf(axis.key));
-    if (axis.name.empty()) {
-        section.missing("key", "what varies, such as \"tissue.fat.youngs_kpa\"; or name, for formulas alone");
-    }
+    section.missingIf(axis.name.empty(), "key",
+                      "what varies, such as \"tissue.fat.youngs_kpa\"; or name, for formulas alone");
     section.refuseIf(!isVariable(axis.name), "name", "must be letters, digits and _, and begin with a letter");
     const int ways = (section.has("values") ? 1 : 0) + (section.has("range") ? 1 : 0) + (section.has("log_range") ? 1 : 0);
-    if (ways != 1) {
-        section.missing("values", "one of values = [..], range = [low, high], log_range = [low, high]");
-    }
+    section.missingIf(ways != 1, "values", "one of values = [..], range = [low, high], log_range = [low, high]");
     if (section.has("values")) {
         const toml::node* const node = section.node("values");
         const toml::array* const list = node->as_array();
@@ -84,9 +84,7 @@ Axis readAxis(Section& section, DesignKind design)
         readRange(section, axis.log ? "log_range" : "range", axis);
         axis.whole = section.flag("whole").value_or(false);
         const auto steps = section.integer("steps", "", 2, maxSteps);
-        if (!steps && design == DesignKind::grid) {
-            section.missing("steps", "how many values of the range a grid has");
-        }
+        section.missingIf(!steps && design == DesignKind::grid, "steps", "how many values of the range a grid has");
         axis.steps = static_cast<std::size_t>(steps.value_or(0));
     }
     section.finish();
@@ -155,9 +153,7 @@ void readMarks(Section& top, SweepPlan& plan)
         OutputMark mark;
         mark.output = section.word("output").value_or("");
         const auto at = section.number("at", "", -furthest, furthest);
-        if (mark.output.empty() || !at) {
-            section.missing(at ? "output" : "at", "a mark has output, at and label");
-        }
+        section.missingIf(mark.output.empty() || !at, at ? "output" : "at", "a mark has output, at and label");
         mark.at = *at;
         mark.label = section.word("label").value_or(fmt::format("{:g}", mark.at));
         section.finish();
@@ -196,9 +192,7 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
     }
     auto words = top.words("outputs");
     if (words.empty()) {
-        for (const OutputInfo& o : outputsOf(kind)) {
-            words.push_back(o.name);
-        }
+        std::ranges::transform(outputsOf(kind), std::back_inserter(words), &OutputInfo::name);
     }
     for (const std::string& word : words) {
         const auto equals = word.find('=');
@@ -209,10 +203,8 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
         } else if (!there.contains(output.name)) {
             top.refuse("outputs", fmt::format("there is no {}; there are {}", output.name, fmt::join(there, ", ")));
         }
-        if (!isVariable(output.name)) {
-            top.refuse("outputs",
-                       fmt::format("'{}': a name must be letters, digits and _, and begin with a letter", output.name));
-        }
+        top.refuseIf(!isVariable(output.name), "outputs",
+                     fmt::format("'{}': a name must be letters, digits and _, and begin with a letter", output.name));
         plan.outputs.push_back(std::move(output));
     }
 }
@@ -223,9 +215,8 @@ UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
     for (const Axis& a : axes) {
         count *= static_cast<double>(a.levels());
     }
-    if (count > static_cast<double>(maxCases)) {
-        top.refuse("axis", fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, maxCases));
-    }
+    top.refuseIf(count > static_cast<double>(maxCases), "axis",
+                 fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, maxCases));
     UnitPoints points(static_cast<std::size_t>(count), std::vector<double>(axes.size()));
     for (std::size_t i = 0; i < points.size(); ++i) {
         std::size_t rest = i;
@@ -242,11 +233,9 @@ UnitPoints listPoints(const std::vector<Axis>& axes, Section& top)
 {
     const std::size_t count = axes.front().values.size();
     for (const Axis& a : axes) {
-        if (a.values.empty() || a.values.size() != count) {
-            top.refuse("axis",
-                       fmt::format("'{}' has {} values and '{}' has {}: in a list every axis has one for each point",
-                                   axes.front().name, count, a.name, a.values.size()));
-        }
+        top.refuseIf(a.values.empty() || a.values.size() != count, "axis",
+                     fmt::format("'{}' has {} values and '{}' has {}: in a list every axis has one for each point",
+                                 axes.front().name, count, a.name, a.values.size()));
     }
     UnitPoints points;
     for (std::size_t i = 0; i < count; ++i) {
@@ -277,10 +266,9 @@ UnitPoints pointsOf(const SweepPlan& plan, Section& top)
 // "depth_mm = 3, d = 10".
 std::string namedPoint(const SweepPlan& plan, const SweepCase& c)
 {
-    std::vector<std::string> out;
-    for (std::size_t a = 0; a < plan.axes.size(); ++a) {
-        out.push_back(fmt::format("{} = {}", plan.axes[a].name, toText(c.parameters[a])));
-    }
+    const auto out = base::mapped<std::string>(std::views::iota(0UL, plan.axes.size()), [&](std::size_t a) {
+        return fmt::format("{} = {}", plan.axes[a].name, toText(c.parameters[a]));
+    });
     return fmt::format("{}", fmt::join(out, ", "));
 }
 
@@ -333,9 +321,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.name = top.word("name").value_or(origin.stem().string());
     plan.about = top.word("about").value_or("");
     const auto scene = top.word("scene");
-    if (!scene) {
-        top.missing("scene", "a built-in scene, a scene file or a volume");
-    }
+    top.missingIf(!scene, "scene", "a built-in scene, a scene file or a volume");
     plan.base = baseScene(*scene, origin);
     plan.seed =
         static_cast<std::uint64_t>(top.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
@@ -344,12 +330,8 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.records = top.flag("records").value_or(false);
     plan.caseLimit = top.number("case_limit_s", "s", 0.001, 1e7).value_or(3600.0);
     readDesign(top, plan);
-    for (Section& section : top.sections("axis")) {
-        plan.axes.push_back(readAxis(section, plan.design));
-    }
-    if (plan.axes.empty()) {
-        top.missing("[[axis]]", "what varies");
-    }
+    plan.axes = base::mapped<Axis>(top.sections("axis"), [&](Section& section) { return readAxis(section, plan.design); });
+    top.missingIf(plan.axes.empty(), "[[axis]]", "what varies");
     plan.settings = readSettings(top, "set");
     plan.reference = readSettings(top, "reference");
     auto procedure = readSettings(top, "procedure");
@@ -367,9 +349,9 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     checkKeys(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);
-    if (static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(maxCases)) {
-        top.refuse("repeats", fmt::format("over {} cases", maxCases));
-    }
+    top.refuseIf(
+        static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(maxCases),
+        "repeats", fmt::format("over {} cases", maxCases));
     probeCases(plan, origin.string());
     probeOutputs(plan, origin.string());
     return plan;

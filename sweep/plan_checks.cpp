@@ -31,9 +31,7 @@ std::string lowerCase(std::string name)
 
 void insertKey(Section& top, const char* where, const std::string& key, std::set<std::string>& keys)
 {
-    if (!key.empty() && !keys.insert(key).second) {
-        top.refuse(where, fmt::format("key '{}' is set twice: leave one out", key));
-    }
+    top.refuseIf(!key.empty() && !keys.insert(key).second, where, fmt::format("key '{}' is set twice: leave one out", key));
 }
 
 // By axis: the values that are tried one by one; of a range of a grid its ends.
@@ -71,10 +69,9 @@ std::set<std::size_t> casesOfValues(const SweepPlan& plan)
 // The table that a scene changes: of its volume, of a file, or the standard one.
 volume::TissueTable tableOf(const datasets::Scene& scene)
 {
-    if (!scene.source.file.empty()) {
-        return volume::Tissue::load(scene.source.file).table();
-    }
-    return scene.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(scene.tissues);
+    return !scene.source.file.empty() ? volume::Tissue::load(scene.source.file).table()
+           : scene.tissues.empty()    ? datasets::defaultTissues()
+                                      : datasets::loadTissues(scene.tissues);
 }
 
 void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::TissueTable>& tables)
@@ -97,10 +94,8 @@ void checkColumns(Section& top, const SweepPlan& plan)
     std::set<std::string> columns{"case",  "point", "repeat",  "seed",    "status",
                                   "error", "build", "machine", "tick_us", "case_s"};
     const auto insert = [&](const char* where, const std::string& name) {
-        if (!columns.insert(lowerCase(name)).second) {
-            top.refuse(where,
-                       fmt::format("'{}' is a column already (letter case does not count): give it another name", name));
-        }
+        top.refuseIf(!columns.insert(lowerCase(name)).second, where,
+                     fmt::format("'{}' is a column already (letter case does not count): give it another name", name));
     };
     for (const Axis& a : plan.axes) {
         insert("axis", a.name);

@@ -52,8 +52,7 @@ public:
         shared_ = new (pages) Shared;
     }
     ~SharedPages() { munmap(shared_, sizeof(Shared)); }
-    SharedPages(const SharedPages&) = delete;
-    SharedPages& operator=(const SharedPages&) = delete;
+    SharedPages& operator=(SharedPages&&) = delete;
     Shared& operator*() const { return *shared_; }
 
 private:
@@ -110,14 +109,9 @@ public:
     ~Processes()
     {
         kill();
-        for (const pid_t pid : pids_) {
-            if (pid > 0) {
-                waitpid(pid, nullptr, 0);
-            }
-        }
+        std::ranges::for_each(pids_, [](pid_t pid) { return pid > 0 ? waitpid(pid, nullptr, 0) : 0; });
     }
-    Processes(const Processes&) = delete;
-    Processes& operator=(const Processes&) = delete;
+    Processes& operator=(Processes&&) = delete;
 
     // Not a part of the constructor: where the system gives no more processes, the destructor ends those that run.
     void start()
@@ -129,11 +123,7 @@ public:
 
     void kill()
     {
-        for (const pid_t pid : pids_) {
-            if (pid > 0) {
-                ::kill(pid, SIGKILL);
-            }
-        }
+        std::ranges::for_each(pids_, [](pid_t pid) { return pid > 0 ? ::kill(pid, SIGKILL) : 0; });
     }
 
     // Takes in those that have ended; how many run.

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace palpate::sweep {
@@ -212,9 +213,8 @@ ProcedureResult wholeSession(const Run& run, const Procedure& p, std::uint64_t s
     session.run(measured, {.servo = {.paced = false, .seconds = p.seconds}, .recorder = run.recorder}, run.also);
     const session::SessionFigures figures = session.figures();
     ProcedureResult result{{}, measured.mean()};
-    for (const haptics::Measure& m : haptics::measures()) {
-        result.values.push_back(m.value(figures.score));
-    }
+    std::ranges::transform(haptics::measures(), std::back_inserter(result.values),
+                           [&](const haptics::Measure& m) { return m.value(figures.score); });
     result.values.insert(result.values.end(), {figures.peakBasic, figures.peakAdditional, 1e3 * figures.energyMade,
                                                static_cast<double>(figures.punctures), hand->finished() ? 1.0 : 0.0});
     return result;

@@ -10,9 +10,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <optional>
+#include <ranges>
 #include <set>
 
 namespace palpate::sweep {
@@ -152,9 +154,7 @@ std::vector<std::size_t> casesOfList(const std::string& list, std::size_t cases)
         const auto last = dash == std::string_view::npos ? first : base::numberIn<std::size_t>(text.substr(dash + 1));
         base::failIf(!first || !last || *first > *last, "--cases {}: must be numbers and ranges, as in 0-9,12", list);
         base::failIf(*last >= cases, "--cases {}: the plan has the cases 0 to {}", list, cases - 1);
-        for (std::size_t i = *first; i <= *last; ++i) {
-            out.insert(i);
-        }
+        std::ranges::copy(std::views::iota(*first, *last + 1), std::inserter(out, out.end()));
     }
     return {out.begin(), out.end()};
 }

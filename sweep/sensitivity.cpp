@@ -1,5 +1,7 @@
 #include <sweep/sensitivity.h>
 
+#include <base/folds.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -35,10 +37,7 @@ using Sample = std::span<const double>;
 std::vector<SobolIndex> indicesOf(const std::vector<Sample>& samples, std::span<const std::size_t> chosen, std::size_t axes)
 {
     const auto n = static_cast<double>(chosen.size());
-    double sum = 0;
-    for (const std::size_t s : chosen) {
-        sum += samples[s][0] + samples[s][1];
-    }
+    const double sum = base::sumOf(chosen, [&](std::size_t s) { return samples[s][0] + samples[s][1]; });
     const double mean = sum / (2 * n);
     double variance = 0;
     std::vector<SobolIndex> out(axes);

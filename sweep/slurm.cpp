@@ -95,8 +95,7 @@ public:
         fs::create_directories(folder.path() / "slurm", failed);
     }
     ~Cluster() { cancel(); }
-    Cluster(const Cluster&) = delete;
-    Cluster& operator=(const Cluster&) = delete;
+    Cluster& operator=(Cluster&&) = delete;
 
     void submit(const std::vector<std::size_t>& cases)
     {
@@ -260,12 +259,8 @@ void workOnChunk(const fs::path& file, int jobs, const std::string& build)
                  "{}: holds no chunk for this task", file.native());
     SweepFolder folder(submission.at("folder").get<std::string>(), "", false);
     const auto lock = submission.at("lock").get<std::string>();
-    std::vector<std::size_t> cases;
-    for (const std::size_t i : submission["chunks"][number]) {
-        if (!folder.has(i)) {
-            cases.push_back(i);
-        }
-    }
+    std::vector<std::size_t> cases = submission["chunks"][number];
+    std::erase_if(cases, [&](std::size_t i) { return folder.has(i); });
     const auto told = [&](std::size_t, std::size_t) {
         base::failIf(FolderLock::holder(folder.path()) != lock,
                      "{}: the run that submitted this task is over: the task ends", folder.path().native());

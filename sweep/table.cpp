@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <system_error>
 
 namespace palpate::sweep {
@@ -131,12 +132,8 @@ SweepTable tableOf(const SweepPlan& plan, const std::vector<std::optional<SweepR
         const auto c = sweepPoint(plan, row->index);
         std::vector<Cell> cells{static_cast<std::int64_t>(c.index), static_cast<std::int64_t>(c.point),
                                 static_cast<std::int64_t>(c.repeat), static_cast<std::int64_t>(c.seed)};
-        for (const auto& p : c.parameters) {
-            cells.push_back(cellOf(p));
-        }
-        for (const double v : row->outputs) {
-            cells.push_back(cellOf(v));
-        }
+        std::ranges::transform(c.parameters, std::back_inserter(cells), [](const auto& p) { return cellOf(p); });
+        std::ranges::transform(row->outputs, std::back_inserter(cells), [](double v) { return cellOf(v); });
         cells.insert(cells.end(), {row->error, row->build, row->machine, 1e6 * row->tickTime, row->seconds});
         table.rows.push_back(std::move(cells));
     }

@@ -80,11 +80,6 @@ struct Plane {
     float down(double v) const { return to.y - static_cast<float>((v - y.low) / (y.high - y.low)) * (to.y - from.y); }
 };
 
-std::string tickText(double v, double step)
-{
-    return said("{:.{}Lf}", v == 0 ? 0.0 : v, step < 0.1 ? 2 : step < 1 ? 1 : 0);
-}
-
 void drawAxes(ImDrawList& draw, const Plane& p)
 {
     const float em = ImGui::GetFontSize();
@@ -92,7 +87,8 @@ void drawAxes(ImDrawList& draw, const Plane& p)
     const auto rows = ticksOf(p.y.low, p.y.high, static_cast<int>((p.to.y - p.from.y) / (1.8F * em)));
     for (const double v : rows) {
         const float at = p.down(v);
-        const std::string text = tickText(v, rows.size() > 1 ? rows[1] - rows[0] : 1);
+        const double step = rows.size() > 1 ? rows[1] - rows[0] : 1;
+        const std::string text = said("{:.{}Lf}", v == 0 ? 0.0 : v, step < 0.1 ? 2 : step < 1 ? 1 : 0);
         draw.AddLine({p.from.x, at}, {p.to.x, at}, ink(quiet, 0.25F));
         draw.AddText({p.from.x - ImGui::CalcTextSize(text.c_str()).x - 0.4F * em, at - 0.5F * em}, ink(quiet),
                      text.c_str());

@@ -15,8 +15,7 @@ public:
     Film() = default;
     /// Ends it; nothing of it stays.
     ~Film();
-    Film(const Film&) = delete;
-    Film& operator=(const Film&) = delete;
+    Film& operator=(Film&&) = delete;
 
     /// Throws std::runtime_error where the viewer cannot be started.
     /// @param title  the viewer's option for it

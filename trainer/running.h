@@ -15,8 +15,7 @@ public:
     Running(const std::filesystem::path& program, const std::vector<std::string>& arguments, std::filesystem::path log);
     /// Ends it: politely, and after five seconds otherwise.
     ~Running();
-    Running(const Running&) = delete;
-    Running& operator=(const Running&) = delete;
+    Running& operator=(Running&&) = delete;
 
     /// Waits so long at most for its end [s]. Returns whether it has ended.
     bool finish(double seconds) noexcept;

@@ -137,10 +137,8 @@ Errand drawDeviceTests(State& state)
     if (ImGui::Button(fitted(tr("Try the hand for 30 s")).c_str())) {
         errand = Errand::tryHand;
     }
-    if (state.useFalcon) {
-        if (buttonBeside(tr("Force test: 1 N"))) {
-            errand = Errand::testForce;
-        }
+    if (state.useFalcon && buttonBeside(tr("Force test: 1 N"))) {
+        errand = Errand::testForce;
     }
     ImGui::EndDisabled();
     if (state.trying) {

@@ -115,8 +115,7 @@ public:
         ImGui_ImplGlfw_Shutdown();
         ImGui::DestroyContext();
     }
-    Gui(const Gui&) = delete;
-    Gui& operator=(const Gui&) = delete;
+    Gui& operator=(Gui&&) = delete;
 
     void begin()
     {

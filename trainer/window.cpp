@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
 #include <utility>
 
 namespace palpate::trainer {
@@ -70,12 +71,7 @@ public:
     }
 
 private:
-    void take()
-    {
-        for (const Press p : errands_.pressed()) {
-            waiting_.push_back(p);
-        }
-    }
+    void take() { std::ranges::copy(errands_.pressed(), std::back_inserter(waiting_)); }
 
     Stage& stage_;
     Errands& errands_;

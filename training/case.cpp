@@ -28,12 +28,10 @@ namespace {
 fs::path fileIn(const Section& top, const Case& made, std::string_view key, const std::string& name)
 {
     const fs::path file(name);
-    if (file.is_absolute() || file.lexically_normal().native().starts_with("..")) {
-        top.refuse(key, "must lie in the case's folder");
-    }
-    if (!fs::is_regular_file(made.folder / file)) {
-        top.refuse(key, fmt::format("there is no such file in {}", made.folder.string()));
-    }
+    top.refuseIf(file.is_absolute() || file.lexically_normal().native().starts_with(".."), key,
+                 "must lie in the case's folder");
+    top.refuseIf(!fs::is_regular_file(made.folder / file), key,
+                 fmt::format("there is no such file in {}", made.folder.string()));
     return made.folder / file;
 }
 
@@ -41,12 +39,9 @@ void readScene(Section& top, Case& made)
 {
     const auto scene = top.word("scene");
     const auto volume = top.word("volume");
-    if (!scene && !volume) {
-        top.missing("scene", "a built-in scene, or a file (.toml) in the folder; or volume = \"FILE.vdb\"");
-    }
-    if (scene && volume) {
-        top.refuse("volume", "there is a scene too: the scene names its volume itself");
-    }
+    top.missingIf(!scene && !volume, "scene",
+                  "a built-in scene, or a file (.toml) in the folder; or volume = \"FILE.vdb\"");
+    top.refuseIf(scene && volume, "volume", "there is a scene too: the scene names its volume itself");
     if (volume) {
         made.scene = fileIn(top, made, "volume", *volume).string();
         return;
@@ -56,102 +51,10 @@ void readScene(Section& top, Case& made)
         return;
     }
     const auto builtIn = datasets::builtInScenes();
-    if (std::ranges::find(builtIn, *scene) == builtIn.end()) {
-        top.refuse("scene", "there is no such built-in scene" + base::meant(*scene, builtIn));
-    }
+    top.refuseIf(std::ranges::find(builtIn, *scene) == builtIn.end(), "scene",
+                 "there is no such built-in scene" + base::meant(*scene, builtIn));
     made.scene = *scene;
 }
-
-}  // namespace
-
-void checkMeasure(const Section& section, std::string_view key, const std::string& measure)
-{
-    const auto keys = base::mapped<std::string>(haptics::measures(), &haptics::Measure::key);
-    if (std::ranges::find(keys, measure) == keys.end()) {
-        section.refuse(key, fmt::format("there is no measure {}{}", measure,
-                                        base::meant(measure, keys, " (docs/score.md lists them)")));
-    }
-}
-
-std::string called(Section& section, std::string_view key, std::string_view what)
-{
-    const auto word = section.word(key);
-    if (!word) {
-        section.missing(key, what);
-    }
-    return *word;
-}
-
-Case loadCase(const fs::path& given)
-{
-    Case made;
-    const fs::path folder = given.filename() == caseFile ? given.parent_path() : given;
-    made.folder = fs::absolute(folder.empty() ? fs::path(".") : folder).lexically_normal();
-    if (!made.folder.has_filename()) {  // "case/"
-        made.folder = made.folder.parent_path();
-    }
-    made.id = made.folder.filename().string();
-    const fs::path file = made.folder / caseFile;
-    const toml::table table = datasets::parseToml(datasets::readText(file), file.string());
-    Section top(table, file.string(), "");
-    made.title = called(top, "title", "a few words");
-    readScene(top, made);
-    if (const auto picture = top.word("picture")) {
-        made.picture = fileIn(top, made, "picture", *picture);
-    }
-    const auto difficulty = top.integer("difficulty", "", 1, hardest);
-    if (!difficulty) {
-        top.missing("difficulty", "1 to 5");
-    }
-    made.difficulty = static_cast<int>(*difficulty);
-    made.briefing = top.words("briefing");
-    if (made.briefing.empty()) {
-        top.missing("briefing", "a list of the task's steps, a sentence each");
-    }
-    made.trains = top.words("trains");
-    made.measures = top.words("measures");
-    for (const std::string& measure : made.measures) {
-        checkMeasure(top, "measures", measure);
-    }
-    made.licence = called(top, "licence", "who may use the case and its volume, e.g. \"CC0-1.0\"");
-    made.source = top.word("source").value_or("");
-    top.finish();
-    return made;
-}
-
-bool isCaseFolder(const fs::path& what)
-{
-    std::error_code none;
-    return fs::is_regular_file(what / caseFile, none);
-}
-
-std::vector<Case> allCases(std::vector<std::string>* faults)
-{
-    auto all = loadedOf<Case>("cases", isCaseFolder, loadCase, faults);
-    std::ranges::sort(all, [](const Case& a, const Case& b) {
-        return a.difficulty != b.difficulty ? a.difficulty < b.difficulty : a.title < b.title;
-    });
-    return all;
-}
-
-Case findCase(const std::string& id)
-{
-    if (isCaseFolder(id) || fs::path(id).filename() == caseFile) {
-        return loadCase(id);
-    }
-    const bool name = !id.empty() && id.find('/') == std::string::npos;
-    for (const fs::path& folder : dataFolders("cases")) {
-        if (name && isCaseFolder(folder / id)) {
-            return loadCase(folder / id);
-        }
-    }
-    std::error_code none;
-    base::failIf(fs::is_directory(id, none), "{}: no case: there is no {} in it", id, caseFile);
-    throw base::error("{}: there is no such case{} (palpate case list)", id,
-                      base::meant(id, base::mapped<std::string>(allCases(), &Case::id)));
-}
-
-namespace {
 
 bool isPng(const fs::path& file)
 {
@@ -195,6 +98,86 @@ std::string lackOf(const datasets::Scene& scene, const std::string& key)
 }
 
 }  // namespace
+
+void checkMeasure(const Section& section, std::string_view key, const std::string& measure)
+{
+    const auto keys = base::mapped<std::string>(haptics::measures(), &haptics::Measure::key);
+    section.refuseIf(
+        std::ranges::find(keys, measure) == keys.end(), key,
+        fmt::format("there is no measure {}{}", measure, base::meant(measure, keys, " (docs/score.md lists them)")));
+}
+
+std::string called(Section& section, std::string_view key, std::string_view what)
+{
+    const auto word = section.word(key);
+    section.missingIf(!word, key, what);
+    return *word;
+}
+
+Case loadCase(const fs::path& given)
+{
+    Case made;
+    const fs::path folder = given.filename() == caseFile ? given.parent_path() : given;
+    made.folder = fs::absolute(folder.empty() ? fs::path(".") : folder).lexically_normal();
+    if (!made.folder.has_filename()) {  // "case/"
+        made.folder = made.folder.parent_path();
+    }
+    made.id = made.folder.filename().string();
+    const fs::path file = made.folder / caseFile;
+    const toml::table table = datasets::parseToml(datasets::readText(file), file.string());
+    Section top(table, file.string(), "");
+    made.title = called(top, "title", "a few words");
+    readScene(top, made);
+    if (const auto picture = top.word("picture")) {
+        made.picture = fileIn(top, made, "picture", *picture);
+    }
+    const auto difficulty = top.integer("difficulty", "", 1, hardest);
+    top.missingIf(!difficulty, "difficulty", "1 to 5");
+    made.difficulty = static_cast<int>(*difficulty);
+    made.briefing = top.words("briefing");
+    top.missingIf(made.briefing.empty(), "briefing", "a list of the task's steps, a sentence each");
+    made.trains = top.words("trains");
+    made.measures = top.words("measures");
+    for (const std::string& measure : made.measures) {
+        checkMeasure(top, "measures", measure);
+    }
+    made.licence = called(top, "licence", "who may use the case and its volume, e.g. \"CC0-1.0\"");
+    made.source = top.word("source").value_or("");
+    top.finish();
+    return made;
+}
+
+bool isCaseFolder(const fs::path& what)
+{
+    std::error_code none;
+    return fs::is_regular_file(what / caseFile, none);
+}
+
+std::vector<Case> allCases(std::vector<std::string>* faults)
+{
+    auto all = loadedOf<Case>("cases", isCaseFolder, loadCase, faults);
+    std::ranges::sort(all, [](const Case& a, const Case& b) {
+        return a.difficulty != b.difficulty ? a.difficulty < b.difficulty : a.title < b.title;
+    });
+    return all;
+}
+
+Case findCase(const std::string& id)
+{
+    if (isCaseFolder(id) || fs::path(id).filename() == caseFile) {
+        return loadCase(id);
+    }
+    const bool name = !id.empty() && id.find('/') == std::string::npos;
+    for (const fs::path& folder : dataFolders("cases")) {
+        if (name && isCaseFolder(folder / id)) {
+            return loadCase(folder / id);
+        }
+    }
+    std::error_code none;
+    base::failIf(fs::is_directory(id, none), "{}: no case: there is no {} in it", id, caseFile);
+    throw base::error("{}: there is no such case{} (palpate case list)", id,
+                      base::meant(id, base::mapped<std::string>(allCases(), &Case::id)));
+}
 
 std::string measureFault(const Case& of, const std::string& measure)
 {

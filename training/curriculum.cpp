@@ -34,12 +34,9 @@ Level readLevel(Section& section)
     const auto [low, high] = ofHundred ? std::pair(0.0, 100.0) : std::pair(-1e9, 1e9);
     level.atLeast = section.number("at_least", "", low, high);
     level.atMost = section.number("at_most", "", low, high);
-    if (!level.atLeast && !level.atMost) {
-        section.missing("at_most", "or at_least: what the measure has to be");
-    }
-    if (level.atLeast && level.atMost && *level.atLeast > *level.atMost) {
-        section.refuse("at_least", "nothing can be at least that and at most what at_most says");
-    }
+    section.missingIf(!level.atLeast && !level.atMost, "at_most", "or at_least: what the measure has to be");
+    section.refuseIf(level.atLeast && level.atMost && *level.atLeast > *level.atMost, "at_least",
+                     "nothing can be at least that and at most what at_most says");
     section.finish();
     return level;
 }
@@ -50,12 +47,8 @@ Gate readGate(Section& section)
     gate.of = static_cast<int>(section.integer("of", "sessions", 1, maxTrials).value_or(gate.of));
     gate.pass = static_cast<int>(section.integer("pass", "sessions", 1, gate.of).value_or(std::min(gate.pass, gate.of)));
     gate.testOnly = section.choice("mode", modeNames).value_or(0) == 1;
-    for (Section& one : section.sections("level")) {
-        gate.levels.push_back(readLevel(one));
-    }
-    if (gate.levels.empty()) {
-        section.missing("level", "at least one [[exercise.level]]: what opens the gate");
-    }
+    gate.levels = base::mapped<Level>(section.sections("level"), readLevel);
+    section.missingIf(gate.levels.empty(), "level", "at least one [[exercise.level]]: what opens the gate");
     return gate;
 }
 
@@ -63,12 +56,8 @@ Exercise readExercise(Section& section, const Curriculum& before)
 {
     Exercise e;
     e.id = called(section, "id", "a short name");
-    if (before.exercise(e.id) != nullptr) {
-        section.refuse("id", "there is an exercise of this name already");
-    }
-    if (e.id.find('/') != std::string::npos) {
-        section.refuse("id", "must be without /");
-    }
+    section.refuseIf(before.exercise(e.id) != nullptr, "id", "there is an exercise of this name already");
+    section.refuseIf(e.id.find('/') != std::string::npos, "id", "must be without /");
     e.title = called(section, "title", "a few words");
     e.caseId = called(section, "case", "a case: palpate case list");
     try {
@@ -83,9 +72,8 @@ Exercise readExercise(Section& section, const Curriculum& before)
     }
     e.guidance =
         static_cast<Guidance>(section.choice("guidance", guidanceNames).value_or(static_cast<std::size_t>(Guidance::fade)));
-    if (section.has("fade_trials") && e.guidance != Guidance::fade) {
-        section.refuse("fade_trials", "guidance does not fade here: add guidance = \"fade\"");
-    }
+    section.refuseIf(section.has("fade_trials") && e.guidance != Guidance::fade, "fade_trials",
+                     "guidance does not fade here: add guidance = \"fade\"");
     e.fadeTrials = static_cast<int>(section.integer("fade_trials", "sessions", 2, maxTrials).value_or(e.fadeTrials));
     e.gate = readGate(section);
     for (const std::string& other : e.after) {
@@ -105,9 +93,8 @@ CusumPlan readCusum(Section& section)
     CusumPlan plan;
     plan.p0 = section.number("acceptable_failure", "", 0.001, 0.9).value_or(plan.p0);
     plan.p1 = section.number("unacceptable_failure", "", 0.002, 0.99).value_or(plan.p1);
-    if (plan.p1 <= plan.p0) {
-        section.refuse("unacceptable_failure", fmt::format("must be over acceptable_failure, {:g}", plan.p0));
-    }
+    section.refuseIf(plan.p1 <= plan.p0, "unacceptable_failure",
+                     fmt::format("must be over acceptable_failure, {:g}", plan.p0));
     plan.alpha = section.number("alpha", "", 0.001, 0.4).value_or(plan.alpha);
     plan.beta = section.number("beta", "", 0.001, 0.4).value_or(plan.beta);
     section.finish();
@@ -135,12 +122,8 @@ Curriculum loadCurriculum(const fs::path& file)
     if (auto section = top.section("cusum")) {
         c.cusum = readCusum(*section);
     }
-    for (Section& section : top.sections("exercise")) {
-        c.exercises.push_back(readExercise(section, c));
-    }
-    if (c.exercises.empty()) {
-        top.missing("exercise", "at least one [[exercise]]");
-    }
+    c.exercises = base::mapped<Exercise>(top.sections("exercise"), [&](Section& one) { return readExercise(one, c); });
+    top.missingIf(c.exercises.empty(), "exercise", "at least one [[exercise]]");
     top.finish();
     return c;
 }
@@ -212,10 +195,8 @@ double guidanceOf(const Exercise& exercise, int number, bool test) noexcept
     if (test || exercise.guidance == Guidance::off) {
         return 0;
     }
-    if (exercise.guidance == Guidance::on) {
-        return 1;
-    }
-    return std::clamp(static_cast<double>(exercise.fadeTrials - number) / (exercise.fadeTrials - 1), 0.0, 1.0);
+    const double left = static_cast<double>(exercise.fadeTrials - number) / (exercise.fadeTrials - 1);
+    return exercise.guidance == Guidance::on ? 1 : std::clamp(left, 0.0, 1.0);
 }
 
 }  // namespace palpate::training

@@ -1,6 +1,7 @@
 #include <training/progress_page.h>
 
 #include <base/counted.h>
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
@@ -280,13 +281,9 @@ void writeProgressPage(const std::filesystem::path& html, const std::vector<Pers
                        const std::vector<report::ScoredGroup>& groups)
 {
     json charts = json::object();
-    std::string body;
-    for (const PersonProgress& p : people) {
-        body += personPart(p, charts);
-    }
-    if (!groups.empty()) {
-        body += report::groupsPart(groups);
-    }
+    std::string body = base::sumOf(
+        people, [&](const PersonProgress& p) { return personPart(p, charts); }, std::string());
+    body += groups.empty() ? "" : report::groupsPart(groups);
     base::writeWhole(html, report::page("Progress - Palpate", body, {{"events", json::array()}, {"charts", charts}}));
 }
 

@@ -100,8 +100,7 @@ public:
             sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
         }
     }
-    Transaction(const Transaction&) = delete;
-    Transaction& operator=(const Transaction&) = delete;
+    Transaction& operator=(Transaction&&) = delete;
     void commit()
     {
         database_.execute("COMMIT");

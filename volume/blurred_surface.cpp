@@ -107,66 +107,6 @@ Density projected(const Blur& blur, Vec3 normal)
     return density;
 }
 
-}  // namespace
-
-double Blur::variance() const noexcept
-{
-    const Vec3 all = box * box / 12.0 + 0.5 * Vec3(passes);
-    return (all.x + all.y + all.z) / 3.0;
-}
-
-PlaneDepth::PlaneDepth(const Blur& blur)
-{
-    std::array<double, bins + 1> fractions;
-    for (std::size_t i = 0; i < fractions.size(); ++i) {
-        fractions[i] = 0.5 + (0.5 - static_cast<double>(lowest)) * static_cast<double>(i) / bins;
-    }
-    for (int i = 0; i <= directions; ++i) {
-        for (int j = 0; j <= directions - i; ++j) {
-            const Vec3 squares(Vec3(i, j, directions - i - j) / static_cast<double>(directions));
-            Curve curve;
-            projected(blur, glm::sqrt(squares)).quantiles(fractions, [&](std::size_t k, double at) {
-                curve[k] = static_cast<float>(at);
-            });
-            curves_.push_back(curve);
-        }
-    }
-}
-
-const PlaneDepth::Curve& PlaneDepth::curve(int i, int j) const noexcept
-{
-    return curves_[static_cast<std::size_t>(i * (directions + 1) - i * (i - 1) / 2 + j)];
-}
-
-float PlaneDepth::at(float fraction, Vec3f normal) const noexcept
-{
-    const float inside = std::min(std::max(fraction, 1.0F - fraction), 1.0F - lowest);
-    const float bin = (inside - 0.5F) / (0.5F - lowest) * static_cast<float>(bins);
-    const int low = std::min(static_cast<int>(bin), bins - 1);
-    const float t = bin - static_cast<float>(low);
-    const auto read = [&](int i, int j) {
-        const Curve& c = curve(i, j);
-        const auto k = static_cast<std::size_t>(low);
-        return c[k] + t * (c[k + 1] - c[k]);
-    };
-    const float x = std::min(normal.x * normal.x, 1.0F) * static_cast<float>(directions);
-    const float y =
-        std::clamp(normal.y * normal.y * static_cast<float>(directions), 0.0F, static_cast<float>(directions) - x);
-    int i = std::min(static_cast<int>(x), directions - 1);
-    int j = std::min(static_cast<int>(y), directions - 1 - i);
-    const float u = x - static_cast<float>(i);
-    const float v = y - static_cast<float>(j);
-    float depth = 0.0F;
-    if (u + v <= 1.0F || i + j + 2 > directions) {
-        depth = (1.0F - u - v) * read(i, j) + u * read(i + 1, j) + v * read(i, j + 1);
-    } else {
-        depth = (u + v - 1.0F) * read(i + 1, j + 1) + (1.0F - v) * read(i + 1, j) + (1.0F - u) * read(i, j + 1);
-    }
-    return fraction >= 0.5F ? depth : -depth;
-}
-
-namespace {
-
 // Height over a plane, a + b u + c v + d u^2 + e u v + f v^2, by weighted least squares.
 class Paraboloid {
 public:
@@ -491,6 +431,62 @@ private:
 };
 
 }  // namespace
+
+double Blur::variance() const noexcept
+{
+    const Vec3 all = box * box / 12.0 + 0.5 * Vec3(passes);
+    return (all.x + all.y + all.z) / 3.0;
+}
+
+PlaneDepth::PlaneDepth(const Blur& blur)
+{
+    std::array<double, bins + 1> fractions;
+    for (std::size_t i = 0; i < fractions.size(); ++i) {
+        fractions[i] = 0.5 + (0.5 - static_cast<double>(lowest)) * static_cast<double>(i) / bins;
+    }
+    for (int i = 0; i <= directions; ++i) {
+        for (int j = 0; j <= directions - i; ++j) {
+            const Vec3 squares(Vec3(i, j, directions - i - j) / static_cast<double>(directions));
+            Curve curve;
+            projected(blur, glm::sqrt(squares)).quantiles(fractions, [&](std::size_t k, double at) {
+                curve[k] = static_cast<float>(at);
+            });
+            curves_.push_back(curve);
+        }
+    }
+}
+
+const PlaneDepth::Curve& PlaneDepth::curve(int i, int j) const noexcept
+{
+    return curves_[static_cast<std::size_t>(i * (directions + 1) - i * (i - 1) / 2 + j)];
+}
+
+float PlaneDepth::at(float fraction, Vec3f normal) const noexcept
+{
+    const float inside = std::min(std::max(fraction, 1.0F - fraction), 1.0F - lowest);
+    const float bin = (inside - 0.5F) / (0.5F - lowest) * static_cast<float>(bins);
+    const int low = std::min(static_cast<int>(bin), bins - 1);
+    const float t = bin - static_cast<float>(low);
+    const auto read = [&](int i, int j) {
+        const Curve& c = curve(i, j);
+        const auto k = static_cast<std::size_t>(low);
+        return c[k] + t * (c[k + 1] - c[k]);
+    };
+    const float x = std::min(normal.x * normal.x, 1.0F) * static_cast<float>(directions);
+    const float y =
+        std::clamp(normal.y * normal.y * static_cast<float>(directions), 0.0F, static_cast<float>(directions) - x);
+    int i = std::min(static_cast<int>(x), directions - 1);
+    int j = std::min(static_cast<int>(y), directions - 1 - i);
+    const float u = x - static_cast<float>(i);
+    const float v = y - static_cast<float>(j);
+    float depth = 0.0F;
+    if (u + v <= 1.0F || i + j + 2 > directions) {
+        depth = (1.0F - u - v) * read(i, j) + u * read(i + 1, j) + v * read(i, j + 1);
+    } else {
+        depth = (u + v - 1.0F) * read(i + 1, j + 1) + (1.0F - v) * read(i + 1, j) + (1.0F - u) * read(i, j + 1);
+    }
+    return fraction >= 0.5F ? depth : -depth;
+}
 
 BlurredSurface blurredSurface(const NodeGrid& grid, std::span<const float> fraction, const Blur& blur)
 {

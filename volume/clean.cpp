@@ -1,5 +1,6 @@
 #include <volume/clean.h>
 
+#include <base/mapped.h>
 #include <volume/pieces.h>
 #include <volume/voxel_distance.h>
 
@@ -91,11 +92,7 @@ std::vector<Relabelled> relabel(LabelImage& image, const SkinLabels& labels, con
             value = labels.skin;
         }
     }
-    std::vector<Relabelled> out;
-    for (const auto& [value, voxels] : taken) {
-        out.push_back({value, voxels, 0});
-    }
-    return out;
+    return base::mapped<Relabelled>(taken, [](const auto& one) { return Relabelled{one.first, one.second, 0}; });
 }
 
 // The tissue that has a face to the outside: 1 where it is no skin, 2 where it is; and the area of the skin [m^2].
@@ -198,11 +195,7 @@ std::vector<Relabelled> keepLargestPieces(LabelImage& image, const std::vector<s
             std::fill_n(at, run.last - run.first + 1, newLabel.at(pieces.root(i)));
         }
     });
-    std::vector<Relabelled> out;
-    for (const auto& [value, line] : report) {
-        out.push_back(line);
-    }
-    return out;
+    return base::mapped<Relabelled>(report, [](const auto& entry) { return entry.second; });
 }
 
 std::vector<Relabelled> addSkin(LabelImage& image, const SkinLabels& labels, double thickness)

@@ -286,59 +286,6 @@ std::vector<float> distances(const NodeGrid& grid, std::span<const SurfacePoint>
     return distance;
 }
 
-}  // namespace
-
-void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vector<std::int32_t>& nearest)
-{
-    if (points.empty()) {
-        return;
-    }
-    std::vector<std::int32_t> down = nearest;
-    tbb::parallel_invoke([&] { Sweep(size, points, nearest).run(true); }, [&] { Sweep(size, points, down).run(false); });
-    nearest = join({size, Vec3(0.0), 1.0}, points, nearest, down);
-}
-
-std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso)
-{
-    const Samples samples{grid, fraction};
-    std::vector<std::int32_t> nearest(grid.count(), -1);
-    const std::vector<SurfacePoint> points = collectSurface(samples, iso, nearest);
-    return distances(grid, points, nearest, [&](Index3, std::size_t i, const SurfacePoint*) { return fraction[i] > iso; });
-}
-
-std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
-                                  float weight)
-{
-    std::vector<std::int32_t> nearest(grid.count(), -1);
-    std::vector<SurfacePoint> points = surface.points;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-        points[k].at += weight * surface.back[k] * points[k].normal;
-        nearest[surface.nodes[k]] = static_cast<std::int32_t>(k);
-    }
-    return distances(grid, points, nearest, [&](Index3 n, std::size_t i, const SurfacePoint* point) {
-        const Vec3f away = point != nullptr ? Vec3f(n) - point->at : Vec3f(1.0F);
-        return glm::dot(away, away) < 1.0F ? glm::dot(away, point->normal) < 0.0F : fraction[i] > 0.5F;
-    });
-}
-
-double integral(const NodeGrid& grid, std::span<const float> fraction)
-{
-    double sum = 0;
-    for (int z = 0; z < grid.size.z; ++z) {
-        for (int y = 0; y < grid.size.y; ++y) {
-            const float* row = fraction.data() + grid.offset({0, y, z});
-            double line = std::accumulate(row, row + grid.size.x, 0.0);
-            line -= 0.5 * static_cast<double>(row[0] + row[grid.size.x - 1]);
-            const double wy = y == 0 || y == grid.size.y - 1 ? 0.5 : 1.0;
-            const double wz = z == 0 || z == grid.size.z - 1 ? 0.5 : 1.0;
-            sum += line * wy * wz;
-        }
-    }
-    return sum * grid.spacing * grid.spacing * grid.spacing;
-}
-
-namespace {
-
 constexpr std::size_t bins = 256;
 constexpr float lowestIso = 0.05F;
 constexpr float highestIso = 0.6F;
@@ -420,6 +367,55 @@ double cellsIn(const NodeGrid& grid, double volume)
 }
 
 }  // namespace
+
+void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vector<std::int32_t>& nearest)
+{
+    if (points.empty()) {
+        return;
+    }
+    std::vector<std::int32_t> down = nearest;
+    tbb::parallel_invoke([&] { Sweep(size, points, nearest).run(true); }, [&] { Sweep(size, points, down).run(false); });
+    nearest = join({size, Vec3(0.0), 1.0}, points, nearest, down);
+}
+
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso)
+{
+    const Samples samples{grid, fraction};
+    std::vector<std::int32_t> nearest(grid.count(), -1);
+    const std::vector<SurfacePoint> points = collectSurface(samples, iso, nearest);
+    return distances(grid, points, nearest, [&](Index3, std::size_t i, const SurfacePoint*) { return fraction[i] > iso; });
+}
+
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
+                                  float weight)
+{
+    std::vector<std::int32_t> nearest(grid.count(), -1);
+    std::vector<SurfacePoint> points = surface.points;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        points[k].at += weight * surface.back[k] * points[k].normal;
+        nearest[surface.nodes[k]] = static_cast<std::int32_t>(k);
+    }
+    return distances(grid, points, nearest, [&](Index3 n, std::size_t i, const SurfacePoint* point) {
+        const Vec3f away = point != nullptr ? Vec3f(n) - point->at : Vec3f(1.0F);
+        return glm::dot(away, away) < 1.0F ? glm::dot(away, point->normal) < 0.0F : fraction[i] > 0.5F;
+    });
+}
+
+double integral(const NodeGrid& grid, std::span<const float> fraction)
+{
+    double sum = 0;
+    for (int z = 0; z < grid.size.z; ++z) {
+        for (int y = 0; y < grid.size.y; ++y) {
+            const float* row = fraction.data() + grid.offset({0, y, z});
+            double line = std::accumulate(row, row + grid.size.x, 0.0);
+            line -= 0.5 * static_cast<double>(row[0] + row[grid.size.x - 1]);
+            const double wy = y == 0 || y == grid.size.y - 1 ? 0.5 : 1.0;
+            const double wz = z == 0 || z == grid.size.z - 1 ? 0.5 : 1.0;
+            sum += line * wy * wz;
+        }
+    }
+    return sum * grid.spacing * grid.spacing * grid.spacing;
+}
 
 float isoForVolume(const NodeGrid& grid, std::span<const float> fraction, double volume)
 {

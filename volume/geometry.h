@@ -7,6 +7,7 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <cstddef>
 
 namespace palpate {
@@ -69,6 +70,13 @@ struct NodeGrid {
     /// From the first node to the last [m].
     Box box() const noexcept { return {origin, position(size - Index3(1))}; }
 };
+
+/// Of the components of a vector that with the largest amount; of equal ones the first.
+inline int longestAxis(Vec3 v) noexcept
+{
+    const Vec3 size = glm::abs(v);
+    return size.z > std::max(size.x, size.y) ? 2 : size.y > size.x ? 1 : 0;
+}
 
 /// Calls visit(index) for every index from `first` to `last`, both included, x fastest.
 template <typename Visit>

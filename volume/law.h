@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -174,12 +175,8 @@ inline constexpr std::array<std::string_view, lawCount> lawNames = [] {
 /// The law of that name, or nothing.
 constexpr std::optional<Law> lawNamed(std::string_view name) noexcept
 {
-    for (std::size_t i = 0; i < lawCount; ++i) {
-        if (lawNames[i] == name) {
-            return laws[i];
-        }
-    }
-    return std::nullopt;
+    const auto at = std::ranges::find(lawNames, name);
+    return at == lawNames.end() ? std::nullopt : std::optional(laws[static_cast<std::size_t>(at - lawNames.begin())]);
 }
 
 constexpr Reach reachOf(const Law& law) noexcept

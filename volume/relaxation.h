@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -25,12 +26,7 @@ struct Relaxation {
     /// Whether the tissue relaxes at all.
     bool any() const noexcept
     {
-        for (const double w : weights) {
-            if (w > 0.0) {
-                return true;
-            }
-        }
-        return false;
+        return std::ranges::any_of(weights, [](double w) { return w > 0.0; });
     }
     /// G(t) / G(0), at the time `seconds` after a step.
     double remaining(double seconds) const noexcept

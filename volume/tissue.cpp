@@ -53,10 +53,7 @@ constexpr double onItsBack = 0.05;  // fraction of a body's depth that is held w
 
 Support onItsBackIn(const Affine& affine, IndexBox body)
 {
-    int axis = 0;
-    for (int a = 1; a < 3; ++a) {
-        axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
-    }
+    const int axis = longestAxis(glm::row(affine.linear, 1));
     const int depth = body.high[axis] - body.low[axis] + 1;
     const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * depth)));
     const bool backIsHigh = affine.linear[axis].y > 0.0;
@@ -64,6 +61,17 @@ Support onItsBackIn(const Affine& affine, IndexBox body)
     index[axis] = backIsHigh ? body.high[axis] + 0.5 - layers : body.low[axis] - 0.5 + layers;
     const Vec3 inIndex = glm::row(glm::inverse(affine.linear), axis);  // grows along the axis alone, in whatever direction
     return {affine.toPatient(index), glm::normalize(backIsHigh ? -inIndex : inIndex)};
+}
+
+// Calls visit(offset, value) for every voxel of a grid, slices on all cores.
+template <typename Grid, typename Visit>
+void forEachVoxel(const Grid& grid, const LabelImage& places, const Visit& visit)
+{
+    tbb::parallel_for(tbb::blocked_range<int>(0, places.size.z, 8), [&](const tbb::blocked_range<int>& slab) {
+        const auto accessor = grid.getConstUnsafeAccessor();
+        forEachIndex(Index3(0, 0, slab.begin()), Index3(places.size.x - 1, places.size.y - 1, slab.end() - 1),
+                     [&](Index3 n) { visit(places.offset(n), accessor.getValue(openvdb::Coord(n.x, n.y, n.z))); });
+    });
 }
 
 }  // namespace
@@ -158,21 +166,6 @@ const StiffnessMap& Tissue::stiffnessMap() const noexcept
 {
     return impl_->stiffnessMap;
 }
-
-namespace {
-
-// Calls visit(offset, value) for every voxel of a grid, slices on all cores.
-template <typename Grid, typename Visit>
-void forEachVoxel(const Grid& grid, const LabelImage& places, const Visit& visit)
-{
-    tbb::parallel_for(tbb::blocked_range<int>(0, places.size.z, 8), [&](const tbb::blocked_range<int>& slab) {
-        const auto accessor = grid.getConstUnsafeAccessor();
-        forEachIndex(Index3(0, 0, slab.begin()), Index3(places.size.x - 1, places.size.y - 1, slab.end() - 1),
-                     [&](Index3 n) { visit(places.offset(n), accessor.getValue(openvdb::Coord(n.x, n.y, n.z))); });
-    });
-}
-
-}  // namespace
 
 LabelImage Tissue::labels() const
 {
@@ -273,19 +266,13 @@ std::string_view name(Role role) noexcept
 std::optional<Role> roleNamed(std::string_view name) noexcept
 {
     const auto at = std::find(roleNames.begin(), roleNames.end(), name);
-    if (at == roleNames.end()) {
-        return std::nullopt;
-    }
-    return static_cast<Role>(at - roleNames.begin());
+    return at == roleNames.end() ? std::nullopt : std::optional(static_cast<Role>(at - roleNames.begin()));
 }
 
 std::optional<std::uint8_t> TissueTable::find(std::string_view wanted) const noexcept
 {
     const auto at = std::find_if(rows.begin(), rows.end(), [&](const TissueRow& row) { return row.name == wanted; });
-    if (at == rows.end()) {
-        return std::nullopt;
-    }
-    return static_cast<std::uint8_t>(at - rows.begin());
+    return at == rows.end() ? std::nullopt : std::optional(static_cast<std::uint8_t>(at - rows.begin()));
 }
 
 }  // namespace palpate::volume

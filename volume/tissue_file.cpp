@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -154,10 +155,7 @@ TissueRow rowFrom(const json& j)
 // Everything that the grids do not hold. JSON numbers keep all 17 digits of a double.
 json describe(const TissueData& t)
 {
-    json rows = json::array();
-    for (const TissueRow& row : t.table.rows) {
-        rows.push_back(toJson(row));
-    }
+    const json rows = base::mapped<json>(t.table.rows, [](const TissueRow& row) { return toJson(row); });
     json structures = json::array();
     for (std::size_t i = 0; i < t.structures.size(); ++i) {
         const Structure& s = t.structures[i];
@@ -216,9 +214,7 @@ void readDescription(const json& j, TissueData& t)
     t.affine.linear = Mat3(vec3(steps.at(0)), vec3(steps.at(1)), vec3(steps.at(2)));
     t.affine.origin = vec3(j.at("origin_m"));
     t.table.name = j.at("table").at("name").get<std::string>();
-    for (const json& row : j.at("table").at("rows")) {
-        t.table.rows.push_back(rowFrom(row));
-    }
+    t.table.rows = base::mapped<TissueRow>(j.at("table").at("rows"), rowFrom);
     t.provenance = j.at("provenance").get<Provenance>();
     readStructures(j.at("structures"), t);
     if (j.contains("image")) {
@@ -333,9 +329,8 @@ void Tissue::save(const std::filesystem::path& file) const
 Tissue Tissue::load(const std::filesystem::path& file)
 {
     initialise();
-    if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        throw base::error("{}: {}", file.string(), why);
-    }
+    const std::string why = base::whyNoFile(file);
+    base::failIf(!why.empty(), "{}: {}", file.string(), why);
     auto impl = std::make_unique<Impl>();
     try {
         json description;

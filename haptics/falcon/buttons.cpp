@@ -1,5 +1,6 @@
 #include <haptics/falcon/buttons.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -27,12 +28,8 @@ std::uint8_t Presses::take(std::uint8_t buttons, double now) noexcept
 
 std::string_view nameOf(std::uint8_t button) noexcept
 {
-    for (const auto& [bit, name] : names) {
-        if (bit == button) {
-            return name;
-        }
-    }
-    return {};
+    const auto found = std::ranges::find(names, button, [](const auto& one) { return one.first; });
+    return found == names.end() ? "" : found->second;
 }
 
 void watchButtons(Link& link, Transport& wire, const std::function<void(std::uint8_t)>& pressed,

@@ -15,11 +15,6 @@ namespace {
 constexpr int driverPriority = 61;     // above the servo thread: it works for microseconds and waits for the wire
 constexpr double betweenTries = 0.25;  // for a Falcon that is to come back [s]
 
-bool torqueIn(const Command& command) noexcept
-{
-    return command.motor != Triple{};
-}
-
 }  // namespace
 
 Driver::Driver(std::unique_ptr<Transport> wire, DriverOptions options, Say say, const std::atomic<bool>& stop)
@@ -96,7 +91,7 @@ void Driver::talk()
         }
         counts_.write(link_.counts());
         if (guardian_) {
-            guardian_->beat(torqueIn(link_.command()));
+            guardian_->beat(link_.command().motor != Triple{});
         }
         if (link_.frozen() != frozen) {
             frozen = !frozen;

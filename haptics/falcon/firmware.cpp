@@ -130,26 +130,22 @@ std::string otherThanFirmware(std::span<const std::uint8_t> image)
 Firmware readFirmware(const std::filesystem::path& file)
 {
     Firmware firmware{file.string(), {}};
-    const auto refuse = [&](const std::string& what) {
-        throw Trouble(Cause::firmwareFile, file.string() + ": " + what + ": give the file with the Falcon's firmware");
+    const auto refuseIf = [&](bool wrong, const std::string& what) {
+        troubleIf(wrong, Cause::firmwareFile, "{}: {}: give the file with the Falcon's firmware", file.string(), what);
     };
     // By its size before a byte is read: a device such as /dev/zero has no end.
     std::error_code none;
-    if (!std::filesystem::is_regular_file(file, none)) {
-        refuse(std::filesystem::exists(file, none) ? "is no regular file" : "cannot be read");
-    }
+    refuseIf(!std::filesystem::is_regular_file(file, none),
+             std::filesystem::exists(file, none) ? "is no regular file" : "cannot be read");
     const std::uintmax_t size = std::filesystem::file_size(file, none);
-    if (none || size < smallest || size > largest) {
-        refuse(fmt::format("has {} bytes, a Falcon's firmware has {} to {}", none ? 0 : size, smallest, largest));
-    }
+    refuseIf(none || size < smallest || size > largest,
+             fmt::format("has {} bytes, a Falcon's firmware has {} to {}", none ? 0 : size, smallest, largest));
     std::ifstream stream(file, std::ios::binary);
     firmware.image.resize(size);
-    if (!stream.read(reinterpret_cast<char*>(firmware.image.data()), static_cast<std::streamsize>(size))) {
-        refuse("cannot be read");
-    }
-    if (const std::string other = otherThanFirmware(firmware.image); !other.empty()) {
-        refuse("holds " + other);
-    }
+    refuseIf(!stream.read(reinterpret_cast<char*>(firmware.image.data()), static_cast<std::streamsize>(size)),
+             "cannot be read");
+    const std::string other = otherThanFirmware(firmware.image);
+    refuseIf(!other.empty(), "holds " + other);
     return firmware;
 }
 

@@ -17,8 +17,7 @@ public:
 
     Guardian();
     ~Guardian();
-    Guardian(const Guardian&) = delete;
-    Guardian& operator=(const Guardian&) = delete;
+    Guardian& operator=(Guardian&&) = delete;
 
     /// The Falcon behind this descriptor is the one to guard from now on; -1: none.
     void guard(int descriptor) noexcept;

@@ -36,12 +36,7 @@ void heed(const std::atomic<bool>& stop)
 bool follows(const Triple& before, const Triple& after, double seconds) noexcept
 {
     const double most = countsAtOnce + countsPerSecond * std::clamp(seconds, 0.0, 0.1);
-    for (std::size_t i = 0; i < 3; ++i) {
-        if (std::abs(after[i] - before[i]) > most) {
-            return false;
-        }
-    }
-    return true;
+    return std::ranges::equal(before, after, [&](double a, double b) { return std::abs(b - a) <= most; });
 }
 
 // From 1 at `from` to 0 at `to`.

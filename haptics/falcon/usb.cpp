@@ -43,8 +43,7 @@ class Context {
 public:
     Context() { check(libusb_init(&context_), "cannot be used"); }
     ~Context() { libusb_exit(context_); }
-    Context(const Context&) = delete;
-    Context& operator=(const Context&) = delete;
+    Context& operator=(Context&&) = delete;
 
     operator libusb_context*() const noexcept { return context_; }
 

@@ -34,8 +34,8 @@ from ._record import Record, score
 from ._studies import accuracy
 from ._sweep import SweepResult, merge, sweep, sweep_outputs
 
-__version__ = _palpate.build.split()[1]
-build = _palpate.build  #: version and commit of the C++ side
+__version__: str = _palpate.build.split()[1]
+build: str = _palpate.build  #: version and commit of the C++ side
 
 __all__ = [
     "DEADMAN", "EVENTS", "Error", "FIRE", "MARK", "Model", "PHASES", "Record", "Scene", "SceneError", "Session", "SweepResult",

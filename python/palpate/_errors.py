@@ -20,7 +20,7 @@ class SceneError(Error, ValueError):
         key: the key, with its section ("dffb.range_mm"); None where no single key is at fault.
     """
 
-    def __init__(self, message, file=None, line=None, key=None):
+    def __init__(self, message: str, file: str | None = None, line: int | None = None, key: str | None = None) -> None:
         super().__init__(message)
         self.file = file
         self.line = line
@@ -30,7 +30,7 @@ class SceneError(Error, ValueError):
         return type(self), (str(self), self.file, self.line, self.key)
 
 
-def scene_error(message):
+def scene_error(message: str) -> SceneError:
     """The SceneError of a message "FILE:LINE: [section] key = value: what is wrong"."""
     place = _PLACE.match(message)
     rest = place["rest"] if place else message

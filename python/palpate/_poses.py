@@ -1,11 +1,14 @@
 """Paths of a tool."""
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ._palpate import TICK_SECONDS
 
 
-def press_path(start, direction, depth, *, speed=0.02, hold=0.1, lead=1e-3):
+def press_path(
+    start: ArrayLike, direction: ArrayLike, depth: float, *, speed: float = 0.02, hold: float = 0.1, lead: float = 1e-3
+) -> NDArray[np.float64]:
     """Positions of a tool that comes straight down, holds, and goes back: one row per tick.
 
     Args:

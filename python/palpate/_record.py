@@ -1,10 +1,17 @@
 """Records of sessions."""
 
+from __future__ import annotations
+
 import os
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ._palpate import RecordFile
+from ._palpate import Model, RecordFile, Session
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import]
 
 # Columns of a table, by field of a tick: the names that a record's own table has.
 _VECTORS = {
@@ -22,7 +29,7 @@ _NUMBERS = {
 _MOVES = ("probe_press_m", "probe_slide_m", "probe_sweep_m", "probe_rock_rad", "probe_tilt_rad", "probe_turn_rad")
 
 
-def columns_of(ticks, structures=None):
+def columns_of(ticks: NDArray[np.void], structures: list[str] | None = None) -> dict[str, NDArray[Any]]:
     """Columns of a structured array of ticks, one number each: {"tip_x_m": array of n, ...}.
 
     Args:
@@ -64,7 +71,13 @@ class Record:
         palpate.Error: the file is no record, or is damaged.
     """
 
-    def __init__(self, file):
+    ticks: NDArray[np.void]
+    events: NDArray[np.void]
+    info: dict[str, Any]
+    results: dict[str, str]
+    complete: bool
+
+    def __init__(self, file: str | os.PathLike[str]) -> None:
         self._file = RecordFile(os.fspath(file))
         self.ticks, self.events = self._file.read_ticks()
         for array in (self.ticks, self.events):
@@ -76,21 +89,21 @@ class Record:
     def __repr__(self):
         return f"<palpate.Record '{self._file.file}': {len(self.ticks)} ticks of '{self.info['scene']}'>"
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.ticks)
 
     @property
-    def file(self):
+    def file(self) -> str:
         """Path of the file."""
         return self._file.file
 
     @property
-    def scene_text(self):
+    def scene_text(self) -> str:
         """The scene as TOML text, enough to run the session again."""
         return self._file.scene_text
 
     @property
-    def poses(self):
+    def poses(self) -> NDArray[np.float64]:
         """Positions [m] and axes, as Session.run() takes them: n x 6; n x 12 with the probe's moves, where one moved."""
         parts = [self.ticks["position"], self.ticks["axis"]]
         if self.ticks["probe_move"].any():
@@ -98,15 +111,15 @@ class Record:
         return np.concatenate(parts, axis=1)
 
     @property
-    def samples(self):
+    def samples(self) -> dict[str, NDArray[Any]]:
         """What Session.run(**record.samples) takes to give the same ticks, bit for bit: poses, buttons, fresh."""
         return {"poses": self.poses, "buttons": self.ticks["buttons"], "fresh": self.ticks["fresh"]}
 
-    def to_dict(self):
+    def to_dict(self) -> dict[str, NDArray[Any]]:
         """Arrays of n by the names that the columns have in the file, events as a bit mask."""
         return columns_of(self.ticks, self.info["structures"])
 
-    def to_dataframe(self):
+    def to_dataframe(self) -> pandas.DataFrame:
         """The same as a pandas.DataFrame, with a column seconds before them. Raises ImportError without pandas."""
         import pandas
 
@@ -114,15 +127,15 @@ class Record:
         frame.insert(0, "seconds", frame["tick"] / self.info["rate"])
         return frame
 
-    def score(self):
+    def score(self) -> dict[str, Any]:
         """Every measure of docs/score.md by its key, `points`, and `doubts`: what makes them doubtful (list of str)."""
         return self._file.score()
 
-    def model(self):
+    def model(self) -> Model:
         """The palpate.Model of the session. Raises palpate.Error when its volume is another now."""
         return self._file.model()
 
-    def replay(self):
+    def replay(self) -> dict[str, Any]:
         """Computes the session again and compares all bits.
 
         Returns:
@@ -135,7 +148,7 @@ class Record:
         return self._file.replay()
 
 
-def score(what):
+def score(what: Record | Session | str | os.PathLike[str]) -> dict[str, Any]:
     """The score of a Record, of a record's file, or of a Session so far: a dict by the keys of docs/score.md."""
     if isinstance(what, (str, os.PathLike)):
         return RecordFile(os.fspath(what)).score()

@@ -5,9 +5,10 @@ import os
 import pathlib
 import shutil
 import subprocess
+from typing import Any
 
 
-def accuracy(file=None, *, command=None):
+def accuracy(file: str | os.PathLike[str] | None = None, *, command: str | os.PathLike[str] | None = None) -> dict[str, Any]:
     """The accuracy figures: how far forces and shapes are from closed forms and finite elements.
 
     Args:

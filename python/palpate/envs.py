@@ -7,15 +7,21 @@
 Where gymnasium is installed, the classes are gymnasium.Env and the spaces are gymnasium.spaces.Box.
 """
 
+from __future__ import annotations
+
 import contextlib
 import multiprocessing
 import operator
 import os
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _palpate
 from ._errors import Error
+from ._palpate import Model, Scene, Session, Volume
 
 try:
     import gymnasium as _gymnasium
@@ -136,11 +142,25 @@ class Biopsy(_Env):
     ValueError for a number out of its range.
     """
 
+    model: Model
+    session: Session | None
+    action_space: Any
+    observation_space: Any
+    max_steps: int
+    max_speed: float
     metadata = {"render_modes": ["ultrasound"], "render_fps": 50}
     ticks_per_step = 20
     lead = 5e-3  # the tip begins so far outside the body [m]
 
-    def __init__(self, scene="breast", *, max_seconds=20.0, max_speed=0.05, entry_error=2e-3, render_mode=None):
+    def __init__(
+        self,
+        scene: str | os.PathLike[str] | Volume | Scene | Model = "breast",
+        *,
+        max_seconds: float = 20.0,
+        max_speed: float = 0.05,
+        entry_error: float = 2e-3,
+        render_mode: str | None = None,
+    ) -> None:
         step_seconds = self.ticks_per_step * _palpate.TICK_SECONDS
         if not step_seconds / 2 < max_seconds < 1e6:
             raise ValueError(f"max_seconds: has to be a step, {step_seconds:g} s, at least, and below 1e6, not {max_seconds}")
@@ -161,7 +181,7 @@ class Biopsy(_Env):
         self.observation_space = _Box(-np.inf, np.inf, (16,), np.float32)
         self.session = None
 
-    def reset(self, *, seed=None, options=None):
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode. Without a seed the episodes follow from the one before.
 
         Returns:
@@ -182,7 +202,7 @@ class Biopsy(_Env):
         return self._observe(settled[-1], 0.0), {
             "ticks": 600, "firing_depth": self.model.firing_depth}
 
-    def step(self, action):
+    def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One step of 20 ms. Returns (observation, reward, terminated, truncated, info)."""
         if self.session is None or self._done:
             raise Error("step: the episode is over: call reset()")
@@ -213,13 +233,13 @@ class Biopsy(_Env):
             reward += info["score"]["total"] / 20.0 if fired else 0.0
         return observation, float(reward), fired, truncated, info
 
-    def render(self):
+    def render(self) -> NDArray[np.uint8] | None:
         """The ultrasound picture, 640 x 640 x 3 (uint8), or None without render_mode="ultrasound"."""
         if self.render_mode is None or self.session is None:
             return None
         return np.repeat(self.session.ultrasound()["pixels"][:, :, None], 3, axis=2)
 
-    def close(self):
+    def close(self) -> None:
         """Lets go of the session."""
         self.session = None
 
@@ -318,7 +338,17 @@ class Vector:
             `if __name__ == "__main__":`.
     """
 
-    def __init__(self, count, make=Biopsy, *, processes=None, seed=None, context="spawn"):
+    count: int
+
+    def __init__(
+        self,
+        count: int,
+        make: Callable[[], Biopsy] = Biopsy,
+        *,
+        processes: int | None = None,
+        seed: int | None = None,
+        context: str = "spawn",
+    ) -> None:
         count = _count(count, "count")
         processes = min(count, (os.cpu_count() or 1) if processes is None else _count(processes, "processes"))
         seed = np.random.SeedSequence(seed).entropy
@@ -340,11 +370,13 @@ class Vector:
             self.close()
             raise
 
-    def reset(self, *, seed=None):
+    def reset(self, *, seed: int | None = None) -> NDArray[np.float32]:
         """Begins all episodes; without a seed they follow from those before. Returns count x 16 observations."""
         return np.stack([observation for observation, _ in self._ask([("reset", seed)] * len(self._parts))])
 
-    def step(self, actions):
+    def step(
+        self, actions: ArrayLike
+    ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], list[dict[str, Any]]]:
         """One step of each.
 
         Args:
@@ -359,7 +391,7 @@ class Vector:
         observations, rewards, terminated, truncated, infos = zip(*results)
         return np.stack(observations), np.array(rewards), np.array(terminated), np.array(truncated), list(infos)
 
-    def close(self):
+    def close(self) -> None:
         """Ends the processes."""
         for pipe in self._pipes:
             try:
@@ -372,10 +404,10 @@ class Vector:
         self._pipes, self._processes = [], []
         self._closed = self._closed or "the environments are closed: make new ones"
 
-    def __enter__(self):
+    def __enter__(self) -> Vector:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _ask(self, requests):

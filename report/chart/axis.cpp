@@ -95,9 +95,7 @@ DrawableChart drawableChart(Chart chart, const std::filesystem::path& file)
     base::failIf(x.empty(), "{}: the chart has no value to draw{}", file.string(),
                  out > 0 ? ": " + leftOut(out, chart.logX || chart.logY) : "");
     out += std::erase_if(chart.bounds, [&](const ChartLine& b) { return !drawable(b.y, chart.logY); });
-    for (const ChartLine& b : chart.bounds) {
-        y.push_back(b.y);
-    }
+    std::ranges::transform(chart.bounds, std::back_inserter(y), &ChartLine::y);
     if (out > 0) {
         chart.note += (chart.note.empty() ? "" : " ") + leftOut(out, chart.logX || chart.logY);
     }

@@ -28,23 +28,16 @@ json axis(const std::string& label, bool log, AxisRange range)
 json chartData(const DrawableChart& drawn)
 {
     const Chart& c = drawn.chart;
-    json series = json::array(), lines = json::array();
-    for (const ChartSeries& s : c.series) {
-        series.push_back({{"label", s.name},
-                          {"line", s.line},
-                          {"markers", s.markers},
-                          {"points", s.label},
-                          {"x", column(s.x)},
-                          {"y", column(s.y)}});
-    }
-    for (const ChartLine& b : c.bounds) {
-        lines.push_back({{"at", b.y}, {"label", b.name}, {"colour", "soft"}});
-    }
+    const auto seriesData = [](const ChartSeries& s) -> json {
+        return {{"label", s.name},   {"line", s.line},   {"markers", s.markers},
+                {"points", s.label}, {"x", column(s.x)}, {"y", column(s.y)}};
+    };
+    const auto lineData = [](const ChartLine& b) -> json { return {{"at", b.y}, {"label", b.name}, {"colour", "soft"}}; };
     return {{"scatter", true},
             {"x", axis(c.xLabel, c.logX, drawn.x)},
             {"y", axis(c.yLabel, c.logY, drawn.y)},
-            {"series", std::move(series)},
-            {"lines", std::move(lines)}};
+            {"series", base::mapped<json>(c.series, seriesData)},
+            {"lines", base::mapped<json>(c.bounds, lineData)}};
 }
 
 }  // namespace

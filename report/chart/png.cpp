@@ -1,4 +1,5 @@
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/outputs.h>
 #include <base/process.h>
 #include <base/utf8.h>
@@ -99,13 +100,8 @@ std::vector<std::string> wrapped(std::string_view text, std::size_t most)
 
 int legendWidth(const Chart& chart)
 {
-    std::size_t most = 0;
-    for (const ChartSeries& s : chart.series) {
-        most = std::max(most, letters(tidy(s.name, longestName)));
-    }
-    for (const ChartLine& b : chart.bounds) {
-        most = std::max(most, letters(tidy(b.name, longestName)));
-    }
+    const auto width = [](const auto& named) { return letters(tidy(named.name, longestName)); };
+    const std::size_t most = base::largestOf(chart.bounds, width, base::largestOf(chart.series, width, std::size_t{0}));
     const std::size_t columns = (chart.series.size() + chart.bounds.size() + legendRows - 1) / legendRows;
     return static_cast<int>(columns) * (80 + letter * static_cast<int>(most));
 }

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -233,12 +234,9 @@ AccuracyRun runAccuracy(const Baseline& method, const AccuracySubject& subject,
 
 std::vector<std::size_t> paretoFront(std::span<const AccuracyPoint> points)
 {
-    std::vector<std::size_t> order;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        if (std::isfinite(points[i].seconds) && std::isfinite(points[i].error)) {
-            order.push_back(i);
-        }
-    }
+    std::vector<std::size_t> order(points.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::erase_if(order, [&](auto i) { return !std::isfinite(points[i].seconds) || !std::isfinite(points[i].error); });
     std::ranges::stable_sort(order, {}, [&](std::size_t i) { return std::pair(points[i].seconds, points[i].error); });
     std::vector<std::size_t> front;
     double best = std::numeric_limits<double>::infinity();

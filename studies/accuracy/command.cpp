@@ -115,12 +115,8 @@ std::vector<Baseline> methodsOf(const AccuracySubject& subject, const AccuracyAr
 void checkMethods(const std::vector<Baseline>& all, const AccuracyArguments& o)
 {
     std::set<std::string> names;
-    for (const Baseline& b : all) {
-        names.insert(b.method);
-    }
-    for (const Rival& rival : installedRivals()) {
-        names.insert(rival.name);
-    }
+    std::ranges::transform(all, std::inserter(names, names.end()), &Baseline::method);
+    std::ranges::transform(installedRivals(), std::inserter(names, names.end()), &Rival::name);
     for (const std::string& name : o.methods) {
         base::failIf(!names.contains(name), "--methods {}: there is no such method; there are {}", name,
                      fmt::join(names, ", "));
@@ -335,9 +331,7 @@ json runAll(const AccuracyArguments& o, const std::vector<std::string>& subjects
 void checkRivals(const json& figures, const AccuracyArguments& o)
 {
     std::set<std::string> names, failures;  // laws of one run share their failures
-    for (const Rival& rival : rivalsOf(o)) {
-        names.insert(rival.name);
-    }
+    std::ranges::transform(rivalsOf(o), std::inserter(names, names.end()), &Rival::name);
     for (const json& e : figures["chart"]) {
         if (e.contains("failure") && names.contains(e["method"].get<std::string>())) {
             failures.insert(fmt::format("rival {}, {}, {}: {}", e["method"].get<std::string>(),

@@ -1,6 +1,7 @@
 #include <studies/accuracy/conforming.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
 #include <studies/accuracy/rival_files.h>
@@ -31,9 +32,7 @@ void runMesher(const fs::path& mesher, const fs::path& volume, const fs::path& m
     const int status = base::run({{mesher.string(), volume.string(), "-o", mesh.string(), "--size",
                                    fmt::format("{:g}", 1e3 * size), "--largest", fmt::format("{:g}", 1e3 * growth * size)},
                                   {-1, said.number(), said.number()}});
-    if (status != 0) {
-        throw base::error("palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log));
-    }
+    base::failIf(status != 0, "palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log));
 }
 
 // Points and tetrahedra of a .msh as palpate-mesh writes it, and the tissue of each.
@@ -193,16 +192,13 @@ TetBody conformingTets(const fs::path& mesher, const volume::Tissue& tissue, dou
 std::vector<Baseline> conformingMethods(const AccuracySubject& subject, const fs::path& mesher)
 {
     const double poissonCap = std::min(unlockedPoisson, subject.poissonCap());
-    std::vector<Baseline> out;
-    for (const double size : {8e-3, 6e-3}) {
-        out.push_back({"tets_conforming", fmt::format("{:g} mm, Poisson {:g}", 1e3 * size, poissonCap),
-                       [&subject, mesher, size, poissonCap] {
-                           return factoredModel(
-                               conformingTets(mesher, *subject.model->tissue, size, poissonCap, FactoredTets::maxPoints),
-                               subject.path);
-                       }});
-    }
-    return out;
+    return base::mapped<Baseline>(std::initializer_list{8e-3, 6e-3}, [&](const double size) {
+        const auto model = [&subject, mesher, size, poissonCap] {
+            return factoredModel(conformingTets(mesher, *subject.model->tissue, size, poissonCap, FactoredTets::maxPoints),
+                                 subject.path);
+        };
+        return Baseline{"tets_conforming", fmt::format("{:g} mm, Poisson {:g}", 1e3 * size, poissonCap), model};
+    });
 }
 
 }  // namespace palpate::studies

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -120,34 +121,6 @@ std::string fileName(std::string what)
     return what;
 }
 
-}  // namespace
-
-std::vector<std::filesystem::path> writeDeepFolder(const std::filesystem::path& folder, const json& figures)
-{
-    std::filesystem::create_directories(folder);
-    command::writeJson(folder / "depth.json", figures);
-    base::writeWhole(folder / "depth.csv", csvOf(figures));
-    std::vector<report::Chart> charts;
-    std::vector<std::filesystem::path> pictures;
-    for (const std::string& what : differentValues(figures.at("summary"), nameOfCase)) {
-        for (const Panel& panel : panels) {
-            report::Chart chart = chartOf(figures, what, panel);
-            if (chart.series.empty()) {
-                continue;
-            }
-            pictures.push_back(folder / fmt::format("depth-{}-{}.png", fileName(what), panel.name));
-            report::writeChartPng(chart, pictures.back());
-            charts.push_back(std::move(chart));
-        }
-    }
-    if (!charts.empty()) {
-        report::writeChartHtml(charts, "First touch, deep presses and the way out", folder / "depth.html");
-    }
-    return pictures;
-}
-
-namespace {
-
 constexpr std::array<std::pair<const char*, const char*>, 5> zones{
     {{"faint", "a < h/2"}, {"touch", "a h/2..1.5h"}, {"middle", "to 1 R"}, {"deep", "to 1.5 R"}, {"deepest", "to 2 R"}}};
 constexpr std::size_t quickPlaces = 2;
@@ -228,12 +201,10 @@ void addCase(const DeepCase& what, const std::string& setting, const DeepPress& 
 
 const json* zoneEntry(const json& summary, const char* zone, const char* way)
 {
-    for (const json& z : summary.at("zones")) {
-        if (z.at("zone") == zone && z.at("way") == way) {
-            return &z;
-        }
-    }
-    return nullptr;
+    const json& zones = summary.at("zones");
+    const auto is = [&](const json& z) { return z.at("zone") == zone && z.at("way") == way; };
+    const auto found = std::ranges::find_if(zones, is);
+    return found == zones.end() ? nullptr : &*found;
 }
 
 std::string errorCells(const json* entry)
@@ -248,12 +219,10 @@ std::string errorCells(const json* entry)
 // Errors after the hold, where the tool is deepest.
 const json* heldEntry(const json& summary)
 {
-    for (const json& z : summary.at("zones")) {
-        if (z.at("way") == wayName(PressWay::hold)) {
-            return &z;
-        }
-    }
-    return nullptr;
+    const json& zones = summary.at("zones");
+    const auto held = [](const json& z) { return z.at("way") == wayName(PressWay::hold); };
+    const auto found = std::ranges::find_if(zones, held);
+    return found == zones.end() ? nullptr : &*found;
 }
 
 void printCase(const json& s)
@@ -299,9 +268,7 @@ std::vector<DeepCase> chosen(const DeepCommand& c)
 {
     std::vector<DeepCase> cases = loadDeepCases(referenceFile());
     std::set<std::string> scenes;
-    for (const DeepCase& one : cases) {
-        scenes.insert(one.scene);
-    }
+    std::ranges::transform(cases, std::inserter(scenes, scenes.end()), &DeepCase::scene);
     for (const std::string& scene : c.scenes) {
         base::failIf(!scenes.contains(scene), "--scenes {}: has no stored forces; scenes with stored forces are {}", scene,
                      fmt::join(scenes, ", "));
@@ -341,6 +308,30 @@ json runAll(const DeepCommand& c)
 }
 
 }  // namespace
+
+std::vector<std::filesystem::path> writeDeepFolder(const std::filesystem::path& folder, const json& figures)
+{
+    std::filesystem::create_directories(folder);
+    command::writeJson(folder / "depth.json", figures);
+    base::writeWhole(folder / "depth.csv", csvOf(figures));
+    std::vector<report::Chart> charts;
+    std::vector<std::filesystem::path> pictures;
+    for (const std::string& what : differentValues(figures.at("summary"), nameOfCase)) {
+        for (const Panel& panel : panels) {
+            report::Chart chart = chartOf(figures, what, panel);
+            if (chart.series.empty()) {
+                continue;
+            }
+            pictures.push_back(folder / fmt::format("depth-{}-{}.png", fileName(what), panel.name));
+            report::writeChartPng(chart, pictures.back());
+            charts.push_back(std::move(chart));
+        }
+    }
+    if (!charts.empty()) {
+        report::writeChartHtml(charts, "First touch, deep presses and the way out", folder / "depth.html");
+    }
+    return pictures;
+}
 
 void deepCommand(const DeepCommand& c)
 {

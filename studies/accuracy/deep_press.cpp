@@ -1,6 +1,7 @@
 #include <studies/accuracy/deep_press.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/processor_time.h>
 #include <base/split.h>
 #include <chainmail/elastic.h>
@@ -89,62 +90,6 @@ DeepReference referenceOf(const Row& row)
     out.elements = static_cast<std::size_t>(row.number(10, 1.0, maxElements));
     return out;
 }
-
-}  // namespace
-
-const char* wayName(PressWay way) noexcept
-{
-    return way == PressWay::in ? "in" : way == PressWay::hold ? "hold" : "out";
-}
-
-double DeepCase::deepest() const noexcept
-{
-    double depth = 0.0;
-    for (const DeepReference& r : references) {
-        depth = std::max(depth, r.depth);
-    }
-    return depth;
-}
-
-std::vector<DeepCase> readDeepCases(std::istream& in, const std::string& origin)
-{
-    std::vector<DeepCase> cases;
-    bool head = true;
-    std::size_t number = 0;
-    for (std::string line; std::getline(in, line);) {
-        ++number;
-        if (const auto text = base::trimmed(line); text.empty() || text.front() == '#') {
-            continue;
-        }
-        const Row row(line, fmt::format("{}:{}", origin, number));
-        if (head) {
-            base::failIf(!row.isHead(), "{}:{}: no line of column names: begin with {}", origin, number,
-                         fmt::join(columns, ","));
-            head = false;
-            continue;
-        }
-        const DeepCase own = caseOf(row);
-        const auto same = [&](const DeepCase& c) { return c.scene == own.scene && c.tool.name == own.tool.name; };
-        auto found = std::ranges::find_if(cases, same);
-        if (found == cases.end()) {
-            found = cases.insert(cases.end(), own);
-        }
-        found->references.push_back(referenceOf(row));
-    }
-    base::failIf(cases.empty(), "{}: holds no forces", origin);
-    return cases;
-}
-
-std::vector<DeepCase> loadDeepCases(const std::filesystem::path& file)
-{
-    std::ifstream in(file);
-    base::failIf(!in, "{}: cannot be read: is it there, and may it be read?", file.native());
-    return readDeepCases(in, file.string());
-}
-
-using namespace chainmail;
-
-namespace {
 
 constexpr int holdTicks = 200;
 
@@ -240,6 +185,54 @@ void addLooks(std::span<const Felt> felt, const DeepCase& what, std::size_t plac
 
 }  // namespace
 
+const char* wayName(PressWay way) noexcept
+{
+    return way == PressWay::in ? "in" : way == PressWay::hold ? "hold" : "out";
+}
+
+double DeepCase::deepest() const noexcept
+{
+    return base::largestOf(references, &DeepReference::depth);
+}
+
+std::vector<DeepCase> readDeepCases(std::istream& in, const std::string& origin)
+{
+    std::vector<DeepCase> cases;
+    bool head = true;
+    std::size_t number = 0;
+    for (std::string line; std::getline(in, line);) {
+        ++number;
+        if (const auto text = base::trimmed(line); text.empty() || text.front() == '#') {
+            continue;
+        }
+        const Row row(line, fmt::format("{}:{}", origin, number));
+        if (head) {
+            base::failIf(!row.isHead(), "{}:{}: no line of column names: begin with {}", origin, number,
+                         fmt::join(columns, ","));
+            head = false;
+            continue;
+        }
+        const DeepCase own = caseOf(row);
+        const auto same = [&](const DeepCase& c) { return c.scene == own.scene && c.tool.name == own.tool.name; };
+        auto found = std::ranges::find_if(cases, same);
+        if (found == cases.end()) {
+            found = cases.insert(cases.end(), own);
+        }
+        found->references.push_back(referenceOf(row));
+    }
+    base::failIf(cases.empty(), "{}: holds no forces", origin);
+    return cases;
+}
+
+std::vector<DeepCase> loadDeepCases(const std::filesystem::path& file)
+{
+    std::ifstream in(file);
+    base::failIf(!in, "{}: cannot be read: is it there, and may it be read?", file.native());
+    return readDeepCases(in, file.string());
+}
+
+using namespace chainmail;
+
 std::span<const GridPlace> gridPlaces() noexcept
 {
     return sixPlaces;
@@ -263,10 +256,10 @@ DeepZone zoneOf(double depth, double radius, double spacing) noexcept
     if (cells < half) {
         return DeepZone::faint;
     }
-    if (radii > most + rounding) {
-        return DeepZone::deepest;
-    }
-    return radii > 1.0 + rounding ? DeepZone::deep : cells <= most ? DeepZone::touch : DeepZone::middle;
+    return radii > most + rounding  ? DeepZone::deepest
+           : radii > 1.0 + rounding ? DeepZone::deep
+           : cells <= most          ? DeepZone::touch
+                                    : DeepZone::middle;
 }
 
 DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, const datasets::ElasticSettings& settings,

@@ -11,15 +11,10 @@ namespace palpate::studies {
 
 namespace {
 
-// Dimitriadis's alpha_0 and beta_0 of a bonded layer.
+// Dimitriadis's alpha_0 of a bonded layer.
 double alphaOf(double nu) noexcept
 {
     return -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
-}
-
-double betaOf(double nu) noexcept
-{
-    return (0.6387 - 1.0277 * nu + 1.5164 * nu * nu) / (1.0 - nu);
 }
 
 }  // namespace
@@ -32,7 +27,8 @@ double hertzForce(double youngsModulus, double poisson, double radius, double de
 double bondedLayerFactor(double poisson, double chi) noexcept
 {
     constexpr double pi = std::numbers::pi;
-    const double a = alphaOf(poisson), b = betaOf(poisson);
+    const double a = alphaOf(poisson);
+    const double b = (0.6387 - 1.0277 * poisson + 1.5164 * poisson * poisson) / (1.0 - poisson);  // his beta_0
     const double x = 2.0 * a * chi / pi;
     return 1.0 - x + x * x - 8.0 / std::pow(pi, 3) * (std::pow(a, 3) + 4.0 * pi * pi / 15.0 * b) * std::pow(chi, 3) +
            16.0 * a / std::pow(pi, 4) * (std::pow(a, 3) + 3.0 * pi * pi / 5.0 * b) * std::pow(chi, 4);

@@ -136,10 +136,8 @@ std::string csvCell(const json& entry, const std::string& key)
     const std::size_t part = key.starts_with("press_") ? 6 : key.starts_with("drag_") ? 5 : 0;
     const json& from = part > 0 ? entry.value(key.substr(0, part - 1), json::object()) : entry;
     const auto found = from.find(key.substr(part));
-    if (found == from.end() || found->is_null()) {
-        return "";
-    }
-    return found->is_string() ? base::csvQuoted(found->get<std::string>()) : found->dump();
+    const bool none = found == from.end() || found->is_null();
+    return none ? "" : found->is_string() ? base::csvQuoted(found->get<std::string>()) : found->dump();
 }
 
 }  // namespace

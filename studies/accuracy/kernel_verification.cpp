@@ -1,5 +1,6 @@
 #include <studies/accuracy/kernel_verification.h>
 
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <chainmail/elastic.h>
 #include <studies/accuracy/deep_press.h>
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ranges>
 #include <span>
 
 namespace palpate::studies {
@@ -88,11 +90,8 @@ double tiesForce(const ElasticBody& body, std::span<const Vec3> points, double s
     const ElasticLoad load{{}, ties, {Vec3(0.0), inward, 0.0}};
     Elastic elastic(body, {.window = window, .maxSites = ties.size()}, load.focus);
     elastic.relax(load, maxCycles, tight);
-    Vec3 sum(0.0);
-    for (std::size_t i = 0; i < ties.size(); ++i) {
-        sum += elastic.tieForce(i);
-    }
-    return glm::length(sum);
+    return glm::length(base::sumOf(
+        std::views::iota(0UL, ties.size()), [&](auto i) { return elastic.tieForce(i); }, Vec3(0)));
 }
 
 // Middles of the top's cells within `radius` of the middle, each cut into `parts` x `parts`.

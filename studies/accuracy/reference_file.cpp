@@ -1,6 +1,7 @@
 #include <studies/accuracy/reference_file.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <volume/fnv.h>
@@ -8,6 +9,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 #include <glm/gtc/type_ptr.hpp>
+#include <glm/gtx/component_wise.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -85,9 +87,8 @@ json positionJson(const std::vector<Vec3f>& position)
 {
     std::vector<std::uint32_t> bits;
     for (int c = 0; c < 3; ++c) {
-        for (const Vec3f& p : position) {
-            bits.push_back(std::bit_cast<std::uint32_t>(p[c]));
-        }
+        std::ranges::transform(position, std::back_inserter(bits),
+                               [&](Vec3f p) { return std::bit_cast<std::uint32_t>(p[c]); });
     }
     return json::binary(packed(bits));
 }
@@ -104,10 +105,8 @@ std::vector<Vec3f> positionOf(const json& binary, std::size_t count)
 
 json stateJson(const ReferenceState& s)
 {
-    float most = 0.0F;
-    for (const Vec3f& u : s.u) {
-        most = std::max({most, std::abs(u.x), std::abs(u.y), std::abs(u.z)});
-    }
+    const auto most = base::largestOf(
+        s.u, [](Vec3f u) { return glm::compMax(glm::abs(u)); }, 0.0F);
     const double quantum = most > 0.0F ? static_cast<double>(most) / quanta : 1.0;
     std::vector<std::int16_t> words;
     for (int c = 0; c < 3; ++c) {
@@ -213,9 +212,7 @@ std::pair<Reference, ReferenceInfo> parsed(const std::string& bytes)
     const auto count = in.at("count").get<std::size_t>();
     base::failIf(count > maxBytes / sizeof(Vec3f), "lists of different lengths");
     r.position = positionOf(in.at("position"), count);
-    for (const json& state : in.at("states")) {
-        r.states.push_back(stateOf(state, count));
-    }
+    r.states = base::mapped<ReferenceState>(in.at("states"), [&](const json& state) { return stateOf(state, count); });
     r.nodes = in.at("nodes").get<std::size_t>();
     r.peakForce = in.at("peak_force").get<double>();
     r.strain = in.at("strain").get<double>();

@@ -2,10 +2,12 @@
 
 #include <base/child_process.h>
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/process.h>
 #include <base/user_files.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
 #include <unistd.h>
@@ -26,15 +28,7 @@ namespace {
 
 std::vector<fs::path> referencesIn(const fs::path& folder)
 {
-    std::vector<fs::path> files;
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator(folder, none)) {
-        if (entry.path().extension() == ".ref") {
-            files.push_back(entry.path());
-        }
-    }
-    std::ranges::sort(files);
-    return files;
+    return base::filesWith(".ref", folder);
 }
 
 std::vector<fs::path> referencesIn(const ReferenceFolders& folders)
@@ -49,12 +43,9 @@ std::vector<fs::path> referencesIn(const ReferenceFolders& folders)
 
 std::optional<fs::path> find(const std::string& key, const ReferenceFolders& folders)
 {
-    for (const fs::path& file : referencesIn(folders)) {
-        if (file.stem().string().ends_with(key)) {
-            return file;
-        }
-    }
-    return std::nullopt;
+    const auto files = referencesIn(folders);
+    const auto found = std::ranges::find_if(files, [&](const fs::path& f) { return f.stem().string().ends_with(key); });
+    return found == files.end() ? std::nullopt : std::optional(*found);
 }
 
 // Whether a reference presses where a scene's path does, but for the way in which the surface was read.
@@ -98,11 +89,7 @@ std::string scenesWith(const std::string& law, const ReferenceFolders& folders)
             }
         }
     }
-    std::string out;
-    for (const std::string& scene : scenes) {
-        out += (out.empty() ? "" : ", ") + scene;
-    }
-    return out.empty() ? "none" : out;
+    return scenes.empty() ? "none" : fmt::format("{}", fmt::join(scenes, ", "));
 }
 
 void solve(const std::string& what, const AccuracySubject& subject, const std::string& law, const fs::path& file)

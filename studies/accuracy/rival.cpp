@@ -17,6 +17,7 @@
 #include <cctype>
 #include <chrono>
 #include <cstdlib>
+#include <iterator>
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
@@ -103,8 +104,7 @@ public:
             ::sigaction(endings[i], &endingsBefore[i], nullptr);
         }
     }
-    EndsWithUs(const EndsWithUs&) = delete;
-    EndsWithUs& operator=(const EndsWithUs&) = delete;
+    EndsWithUs& operator=(EndsWithUs&&) = delete;
 };
 
 // What the command said last, for a message.
@@ -131,12 +131,8 @@ void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
         const std::string which = child.killed() ? "a signal" : fmt::format("signal {}", status - signalled);
         throw base::error("was ended by {}{}", which, lastWords(log));
     }
-    if (child.pid() > 0) {
-        throw base::error("has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log));
-    }
-    if (status != 0) {
-        throw base::error("exit status {}{}", status, lastWords(log));
-    }
+    base::failIf(child.pid() > 0, "has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log));
+    base::failIf(status != 0, "exit status {}{}", status, lastWords(log));
 }
 
 TrialResult compared(const RivalAnswer& answer, const TetBody& mesh, const AccuracySubject& subject,
@@ -179,9 +175,8 @@ void answerPush(const Rival& rival, const TetBody& mesh, const AccuracySubject& 
     const RivalAnswer answer = readRivalAnswer(folder, looks, mesh.points.size());
     run.hasForce = true;
     run.buildSeconds = std::max(0.0, took - std::accumulate(answer.seconds.begin(), answer.seconds.end(), 0.0));
-    for (const Reference* reference : references) {
-        run.results.push_back(compared(answer, mesh, subject, *reference));
-    }
+    const auto compare = [&](const Reference* reference) { return compared(answer, mesh, subject, *reference); };
+    std::ranges::transform(references, std::back_inserter(run.results), compare);
 }
 
 }  // namespace

@@ -97,16 +97,13 @@ void addPath(json& push, const AccuracySubject& subject)
 template <typename Take>
 std::size_t readTable(const std::filesystem::path& file, std::string_view head, std::size_t most, Take&& take)
 {
-    const auto fail = [&](const std::string& what) { throw base::error("{}: {}", file.filename().string(), what); };
+    const std::string name = file.filename().string();
     std::ifstream in(file);
-    if (!in || std::filesystem::is_directory(file)) {
-        fail("was not written");
-    }
+    base::failIf(!in || std::filesystem::is_directory(file), "{}: was not written", name);
     const std::size_t columns = base::csvCells(head).size();
     std::string line;
-    if (!std::getline(in, line) || base::csvCells(line) != base::csvCells(head)) {
-        fail(fmt::format("its first line must be {}", head));
-    }
+    base::failIf(!std::getline(in, line) || base::csvCells(line) != base::csvCells(head), "{}: its first line must be {}",
+                 name, head);
     std::size_t rows = 0;
     std::vector<double> numbers(columns);
     for (std::size_t number = 2; std::getline(in, line); ++number) {
@@ -114,19 +111,14 @@ std::size_t readTable(const std::filesystem::path& file, std::string_view head, 
             continue;
         }
         const auto cells = base::csvCells(line);
-        if (cells.size() != columns) {
-            fail(fmt::format("line {}: {} values: must be {}", number, cells.size(), head));
-        }
+        base::failIf(cells.size() != columns, "{}: line {}: {} values: must be {}", name, number, cells.size(), head);
         for (std::size_t c = 0; c < columns; ++c) {
             const std::optional<double> value = base::numberIn(cells[c]);
-            if (!value || !(std::abs(*value) <= largest)) {
-                fail(fmt::format("line {}: '{}': must be a finite number", number, cells[c]));
-            }
+            base::failIf(!value || !(std::abs(*value) <= largest), "{}: line {}: '{}': must be a finite number", name,
+                         number, cells[c]);
             numbers[c] = *value;
         }
-        if (++rows > most) {
-            fail(fmt::format("line {}: more than {} rows", number, most));
-        }
+        base::failIf(++rows > most, "{}: line {}: more than {} rows", name, number, most);
         take(std::span<const double>(numbers));
     }
     return rows;

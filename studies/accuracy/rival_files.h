@@ -21,8 +21,7 @@ public:
     /// @param flags  of open(2)
     File(const std::filesystem::path& path, int flags) : number_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {}
     ~File() { ::close(number_); }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
+    File& operator=(File&&) = delete;
     int number() const noexcept { return number_; }
 
 private:

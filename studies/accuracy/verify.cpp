@@ -12,6 +12,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
@@ -97,10 +98,7 @@ void verifyCommand(bool quick, const std::filesystem::path& file)
         }
     }
     command::writeJson(file, {{"verification", rows}, {"chart", json::array()}});
-    std::size_t over = 0;
-    for (const json& row : rows) {
-        over += row["holds"].get<bool>() ? 0 : 1;
-    }
+    const auto over = std::ranges::count(rows, false, [](const json& row) { return row["holds"].get<bool>(); });
     base::failIf(both && !missing.empty(), "{}", missing);
     base::failIf(over > 0, "{} of {} rows are over their bounds: see the table", over, rows.size());
 }

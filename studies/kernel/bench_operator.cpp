@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <random>
 #include <stdexcept>
 
@@ -14,9 +15,7 @@ KernelSets kernelSets()
 {
     using namespace chainmail;
     KernelSets sets{{kernelsV2.name, kernelsAvx2.name, kernelsAvx512.name}, {}};
-    for (const Kernels* set : supportedKernels()) {
-        sets.runs.emplace_back(set->name);
-    }
+    std::ranges::transform(supportedKernels(), std::back_inserter(sets.runs), &Kernels::name);
     return sets;
 }
 
@@ -138,10 +137,11 @@ OperatorBench benchOperator(const std::vector<int>& windows)
 
 const OperatorCase& caseOf(const OperatorBench& bench, const std::string& set, bool finiteStrain, int window)
 {
-    for (const OperatorCase& c : bench.cases) {
-        if (c.set == set && c.finiteStrain == finiteStrain && c.window == window) {
-            return c;
-        }
+    const auto is = [&](const OperatorCase& c) {
+        return c.set == set && c.finiteStrain == finiteStrain && c.window == window;
+    };
+    if (const auto found = std::ranges::find_if(bench.cases, is); found != bench.cases.end()) {
+        return *found;
     }
     throw std::out_of_range("operator: there is no such case");
 }

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <vector>
@@ -139,14 +140,10 @@ KernelRequest requestOf(const KernelArguments& o)
 {
     KernelRequest request;
     request.settings = o.settings;
-    for (const auto& tool : trialTools()) {
-        if (o.tools.empty() || std::ranges::find(o.tools, tool.name) != o.tools.end()) {
-            request.tools.push_back(tool);
-        }
-    }
-    for (const double speed : o.speeds) {
-        request.speeds.push_back(1e-3 * speed);
-    }
+    std::ranges::copy_if(trialTools(), std::back_inserter(request.tools), [&](const auto& tool) {
+        return o.tools.empty() || std::ranges::find(o.tools, tool.name) != o.tools.end();
+    });
+    request.speeds = base::mapped<double>(o.speeds, [](double speed) { return 1e-3 * speed; });
     const bool standard = std::ranges::find(o.settings, "default") != o.settings.end();
     request.rivalsOf = standard ? "default" : o.settings.back();
     request.rivalCycles = o.quick ? 1 : 4;

@@ -82,15 +82,14 @@ nlohmann::json rivalFigures(const KernelCase& c)
 
 nlohmann::json workFigures(std::span<const KernelWork> work)
 {
-    auto out = nlohmann::json::array();
-    for (const KernelWork& w : work) {
-        out.push_back({{"operation", w.operation},
-                       {"purpose", w.purpose},
-                       {"calls", w.calls},
-                       {"nodes", w.nodes},
-                       {"kilobytes", 1e-3 * w.bytes}});
-    }
-    return out;
+    return base::mapped<nlohmann::json>(work, [](const KernelWork& w) -> nlohmann::json {
+        const double kilobytes = 1e-3 * w.bytes;
+        return {{"operation", w.operation},
+                {"purpose", w.purpose},
+                {"calls", w.calls},
+                {"nodes", w.nodes},
+                {"kilobytes", kilobytes}};
+    });
 }
 
 nlohmann::json caseFigures(const KernelCase& c, const MachineRates& rates)

@@ -1,5 +1,6 @@
 #include <studies/kernel/kernel_trial.h>
 
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <base/processor_time.h>
 
@@ -15,6 +16,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <ranges>
 #include <utility>
 
 namespace palpate::studies {
@@ -69,20 +71,13 @@ Vec3 forceOn(const Elastic& elastic, const TrialPath& path)
     if (path.ties.empty()) {
         return elastic.toolForce(0);
     }
-    Vec3 sum(0.0);
-    for (std::size_t i = 0; i < path.ties.size(); ++i) {
-        sum += elastic.tieForce(i);
-    }
-    return sum;
+    return base::sumOf(
+        std::views::iota(0UL, path.ties.size()), [&](auto i) { return elastic.tieForce(i); }, Vec3(0.0));
 }
 
 double contactForces(const Elastic& elastic)
 {
-    double sum = 0.0;
-    for (const ContactSite& s : elastic.sites()) {
-        sum += glm::length(s.force);
-    }
-    return sum;
+    return base::sumOf(elastic.sites(), [](const ContactSite& s) { return static_cast<double>(glm::length(s.force)); });
 }
 
 // From rest, or, where the energy may have more than one minimum, from the state before.
@@ -373,10 +368,7 @@ FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed
     times.fromRest = solve(-2);
     solve(-1);
     solve(0);  // from here on there is an increment to go on from
-    std::vector<double> seconds;
-    for (int t = 1; t <= few; ++t) {
-        seconds.push_back(solve(t));
-    }
+    const auto seconds = base::mapped<double>(std::views::iota(1, few + 1), solve);
     times.warm = median(seconds);
     return times;
 }

@@ -1,5 +1,6 @@
 #include <studies/kernel/kernel_work.h>
 
+#include <base/folds.h>
 #include <studies/kernel/bench_operator.h>
 
 #include <algorithm>
@@ -200,11 +201,9 @@ std::vector<KernelWork> CountedKernels::work(double parts) const
 
 double minTime(std::span<const KernelWork> work, const MachineRates& rates) noexcept
 {
-    double sum = 0;
-    for (const KernelWork& w : work) {
-        sum += minTime(OperatorCost{w.additions, w.multiplications, w.bytes}, rates);
-    }
-    return sum;
+    return base::sumOf(work, [&](const KernelWork& w) {
+        return minTime(OperatorCost{w.additions, w.multiplications, w.bytes}, rates);
+    });
 }
 
 }  // namespace palpate::studies

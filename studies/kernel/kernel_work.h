@@ -24,8 +24,7 @@ struct KernelWork {
 class CountedKernels {
 public:
     CountedKernels() noexcept;
-    CountedKernels(const CountedKernels&) = delete;
-    CountedKernels& operator=(const CountedKernels&) = delete;
+    CountedKernels& operator=(CountedKernels&&) = delete;
 
     /// The operations that count: the same results, to the bit.
     const chainmail::Kernels& kernels() const noexcept;

@@ -84,8 +84,7 @@ std::vector<TrialTick> schedule(const TrialPath& path, double speed);
 class TrialLoad {
 public:
     explicit TrialLoad(const TrialPath& path);
-    TrialLoad(const TrialLoad&) = delete;
-    TrialLoad& operator=(const TrialLoad&) = delete;
+    TrialLoad& operator=(TrialLoad&&) = delete;
 
     void set(TrialPose pose) noexcept;
     const chainmail::ElasticLoad& load() const noexcept { return load_; }

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
@@ -88,9 +89,8 @@ report::Chart layeredChart(const LayeredNeedle& layered)
 report::Chart liverChart(const std::vector<LiverNeedle>& liver)
 {
     report::Chart chart{"A needle into liver", "depth of the hand [mm]", "force on the hand [N]"};
-    for (const auto& l : liver) {
-        chart.series.push_back(seriesOf(l.curve, l.curve.turn));
-    }
+    std::ranges::transform(liver, std::back_inserter(chart.series),
+                           [](const auto& l) { return seriesOf(l.curve, l.curve.turn); });
     const auto add = [&](const char* name, double from, double to, auto force) {
         report::ChartSeries s{name, {}, {}, true, false};
         for (double z = from; z <= to; z += 1e-3) {
@@ -132,11 +132,9 @@ report::Chart onsetChart(const Onset& onset)
 
 json boundariesEntry(const std::vector<NeedleBoundary>& boundaries)
 {
-    json out = json::array();
-    for (const auto& b : boundaries) {
-        out.push_back({{"tissue", b.tissue}, {"depth_mm", 1e3 * b.depth}, {"force_n", b.force}});
-    }
-    return out;
+    return base::mapped<json>(boundaries, [](const auto& b) -> json {
+        return {{"tissue", b.tissue}, {"depth_mm", 1e3 * b.depth}, {"force_n", b.force}};
+    });
 }
 
 json curveEntry(const NeedleCurve& c)
@@ -152,10 +150,7 @@ json curveEntry(const NeedleCurve& c)
 
 json figuresJson(const Figures& f)
 {
-    json curves = json::array(), liver = json::array();
-    for (const auto& c : f.layered.curves) {
-        curves.push_back(curveEntry(c));
-    }
+    json curves = base::mapped<json>(f.layered.curves, curveEntry), liver = json::array();
     for (const auto& l : f.liver) {
         liver.push_back({{"name", l.curve.name},
                          {"youngs_kpa", 1e-3 * l.youngsModulus},

@@ -109,6 +109,32 @@ void compareLiver(LiverNeedle& liver)
     }
 }
 
+constexpr double ballRadius = 14e-3;    // [m]
+constexpr double aside = 2e-3;          // of the ball's way from the vessel's middle [m]
+constexpr double deepestOnset = 12e-3;  // [m]
+constexpr double vesselDepth = 14e-3;
+
+haptics::SessionModel besideVessel()
+{
+    auto scene = datasets::parseScene(
+        "name = \"onset\"\n[volume]\nphantom = \"block\"\n[volume.parameters]\ntumours = 0\nwidth_mm = 90\nthickness_mm = "
+        "60\n"
+        "[[insert]]\nname = \"artery\"\ntissue = \"artery\"\ndiameter_mm = 6\ncentre_mm = [0, 14, -45]\nto_mm = [0, 14, "
+        "45]\n"
+        "[tool]\nkind = \"sphere\"\nradius_mm = 14\n[dffb]\nmode = \"off\"\n"
+        "[[vital]]\nname = \"artery\"\nwarn_mm = 19\n"
+        "[target]\nstructure = \"base\"\nentry_mm = [2, 0, 0]\naim_mm = [2, 62, 0]\n",
+        "onset.toml");
+    return haptics::buildModel(std::move(scene));
+}
+
+double onsetOf(const Onset& onset, double OnsetPoint::*distance)
+{
+    const auto near = [&](const OnsetPoint& p) { return p.*distance < onset.warnDistance; };
+    const auto first = std::ranges::find_if(onset.points, near);
+    return first == onset.points.end() ? std::numeric_limits<double>::infinity() : first->pressed;
+}
+
 }  // namespace
 
 NeedleCurve driveNeedle(const haptics::SessionModel& model, const StabilityMethod& method, const NeedleDrive& drive,
@@ -212,39 +238,6 @@ std::vector<LiverNeedle> liverNeedles(datasets::ModelLevel level)
     }
     return all;
 }
-
-namespace {
-
-constexpr double ballRadius = 14e-3;    // [m]
-constexpr double aside = 2e-3;          // of the ball's way from the vessel's middle [m]
-constexpr double deepestOnset = 12e-3;  // [m]
-constexpr double vesselDepth = 14e-3;
-
-haptics::SessionModel besideVessel()
-{
-    auto scene = datasets::parseScene(
-        "name = \"onset\"\n[volume]\nphantom = \"block\"\n[volume.parameters]\ntumours = 0\nwidth_mm = 90\nthickness_mm = "
-        "60\n"
-        "[[insert]]\nname = \"artery\"\ntissue = \"artery\"\ndiameter_mm = 6\ncentre_mm = [0, 14, -45]\nto_mm = [0, 14, "
-        "45]\n"
-        "[tool]\nkind = \"sphere\"\nradius_mm = 14\n[dffb]\nmode = \"off\"\n"
-        "[[vital]]\nname = \"artery\"\nwarn_mm = 19\n"
-        "[target]\nstructure = \"base\"\nentry_mm = [2, 0, 0]\naim_mm = [2, 62, 0]\n",
-        "onset.toml");
-    return haptics::buildModel(std::move(scene));
-}
-
-double onsetOf(const Onset& onset, double OnsetPoint::*distance)
-{
-    for (const OnsetPoint& p : onset.points) {
-        if (p.*distance < onset.warnDistance) {
-            return p.pressed;
-        }
-    }
-    return std::numeric_limits<double>::infinity();
-}
-
-}  // namespace
 
 Onset warningOnset(double speed)
 {

@@ -15,7 +15,6 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <stdexcept>
 #include <string_view>
 
 namespace palpate::studies {
@@ -75,9 +74,7 @@ public:
             return false;
         }
         cells_ = base::csvCells(line_);
-        if (cells_.size() != count_) {
-            throw base::error("{}: {} values: must be {}, one per column", where(), cells_.size(), count_);
-        }
+        base::failIf(cells_.size() != count_, "{}: {} values: must be {}, one per column", where(), cells_.size(), count_);
         return true;
     }
 
@@ -148,9 +145,7 @@ std::ifstream opened(const std::filesystem::path& file, const char* what)
     if (why.empty()) {
         in.open(file);
     }
-    if (!in.is_open()) {
-        throw base::error("{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what);
-    }
+    base::failIf(!in.is_open(), "{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what);
     return in;
 }
 
@@ -160,22 +155,17 @@ Vec3 axisOf(const NumberFile& file)
     const Vec3 along =
         volume::rescaled({file.number(axis, most, ""), file.number(axis + 1, most, ""), file.number(axis + 2, most, "")});
     const double length = glm::length(along);
-    if (!(length > 0)) {
-        throw std::runtime_error(file.where() + ": the axis is zero: it must say where the tool points to");
-    }
+    base::failIf(!(length > 0), "{}: the axis is zero: it must say where the tool points to", file.where());
     return along / length;
 }
 
 void checkFollows(const NumberFile& file, const ToolPose& before, const ToolPose& pose)
 {
-    if (!(pose.seconds > before.seconds)) {
-        throw base::error("{}: seconds = {:g}: must be after {:g}, the row before", file.where(), pose.seconds,
-                          before.seconds);
-    }
-    if (glm::dot(before.axis, pose.axis) < halfTurn) {
-        throw std::runtime_error(
-            file.where() + ": the axis turns by half a turn from the row before: add a row between that says which way");
-    }
+    base::failIf(!(pose.seconds > before.seconds), "{}: seconds = {:g}: must be after {:g}, the row before", file.where(),
+                 pose.seconds, before.seconds);
+    base::failIf(glm::dot(before.axis, pose.axis) < halfTurn,
+                 "{}: the axis turns by half a turn from the row before: add a row between that says which way",
+                 file.where());
 }
 
 }  // namespace

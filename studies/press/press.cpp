@@ -1,6 +1,8 @@
 #include <studies/press/press.h>
 
 #include <base/error.h>
+#include <base/folds.h>
+#include <base/mapped.h>
 #include <base/processor_time.h>
 #include <chainmail/level.h>
 #include <haptics/simulation.h>
@@ -11,6 +13,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <ranges>
 
 namespace palpate::studies {
 
@@ -142,11 +145,8 @@ Vec3 PoseLoad::force(const chainmail::Elastic& elastic) const noexcept
     if (!isNeedle()) {
         return elastic.toolForce(0);
     }
-    Vec3 sum(0.0);
-    for (std::size_t i = 0; i < ties_.size(); ++i) {
-        sum += elastic.tieForce(i);
-    }
-    return sum;
+    return base::sumOf(
+        std::views::iota(0UL, ties_.size()), [&](auto i) { return elastic.tieForce(i); }, Vec3(0.0));
 }
 
 using chainmail::Elastic;
@@ -215,9 +215,7 @@ public:
             PressSample s = solve(path_.at(tick), wanted && options_.converge);
             count(s, wanted || !options_.converge);
             if (wanted) {
-                for (const Vec3& anchor : anchors_) {
-                    s.displacement.push_back(elastic_.displacement(anchor));
-                }
+                s.displacement = base::mapped<Vec3>(anchors_, [&](Vec3 anchor) { return elastic_.displacement(anchor); });
                 sample(s);
             }
         }

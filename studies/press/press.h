@@ -28,8 +28,7 @@ public:
     /// @param first  where a needle takes hold
     /// @pre          the model's level is elastic
     PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec& tool, const ToolPose& first);
-    PoseLoad(const PoseLoad&) = delete;
-    PoseLoad& operator=(const PoseLoad&) = delete;
+    PoseLoad& operator=(PoseLoad&&) = delete;
 
     /// False for a needle whose tip is not in tissue at `first`: then it may not be used.
     bool holds() const noexcept { return !isNeedle() || !ties_.empty(); }

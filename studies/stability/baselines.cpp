@@ -1,3 +1,4 @@
+#include <base/folds.h>
 #include <chainmail/propagate.h>
 #include <haptics/bounded.h>
 #include <studies/stability/method.h>
@@ -85,40 +86,6 @@ struct GodObject {
     }
 };
 
-}  // namespace
-
-// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995; on the faces of
-// voxels.
-StabilityMethod godObject()
-{
-    return {"god_object", [](const MethodScene& scene) -> RunningMethod {
-                auto god = std::make_shared<GodObject>(
-                    GodObject{scene, ContactVoxels(scene.model), volume::Tissue::Reader(*scene.model.tissue)});
-                return {[god](const haptics::DeviceSample& sample) { return god->tick(sample); }};
-            }};
-}
-
-// K d along the gradient of the distance to the surface.
-StabilityMethod penalty()
-{
-    return {"penalty", [](const MethodScene& scene) -> RunningMethod {
-                auto reader = std::make_shared<const volume::Tissue::Reader>(*scene.model.tissue);
-                const bool ball = scene.model.scene.tool.kind != datasets::ToolKind::needle;
-                const double radius = ball ? scene.model.scene.tool.radius : 0.0;
-                return {[=](const haptics::DeviceSample& sample) {
-                    const double depth = radius - scene.model.surface.distance(sample.position);
-                    if (depth <= 0.0) {
-                        return Vec3(0.0);
-                    }
-                    const Vec3 normal = scene.model.surface.normal(sample.position);
-                    const double k = contactStiffness(scene, *reader, sample.position - radius * normal, -normal);
-                    return haptics::bounded(k * depth * normal, capOf(scene));
-                }};
-            }};
-}
-
-namespace {
-
 constexpr int furthest = 64;  // voxels that are looked through for the way out
 
 // The way out of the solid from `p` along one side of one axis, in voxels.
@@ -148,27 +115,6 @@ Vec3 depthVector(const ContactVoxels& voxels, Vec3 p) noexcept
     }
     return sum * voxels.grid.spacing;
 }
-
-}  // namespace
-
-// Source: Massie and Salisbury, "The PHANToM haptic interface: a device for probing virtual objects", ASME 1994.
-StabilityMethod superposedNormals()
-{
-    return {"superposed_normals", [](const MethodScene& scene) -> RunningMethod {
-                auto voxels = std::make_shared<const ContactVoxels>(scene.model);
-                auto reader = std::make_shared<const volume::Tissue::Reader>(*scene.model.tissue);
-                return {[=](const haptics::DeviceSample& sample) {
-                    if (!voxels->solid(voxels->voxel(sample.position))) {
-                        return Vec3(0.0);
-                    }
-                    const Vec3 depth = depthVector(*voxels, sample.position);
-                    const double k = contactStiffness(scene, *reader, sample.position, sample.axis);
-                    return haptics::bounded(k * depth, capOf(scene));
-                }};
-            }};
-}
-
-namespace {
 
 // One layer at a time is there to be touched. When it gives way it is removed for good, and its flag keeps a force along
 // the needle until the next layer is touched: also in a gap, and also in the air outside.
@@ -222,22 +168,6 @@ struct Layers {
         return haptics::bounded(-force * sample.axis, capOf(scene));
     }
 };
-
-}  // namespace
-
-// The layer-based model of the thesis that Palpate started from.
-StabilityMethod layers()
-{
-    const auto start = [](const MethodScene& scene) -> RunningMethod {
-        const auto& tool = scene.model.scene.tool;
-        const double front = tool.kind == datasets::ToolKind::needle ? 0.0 : tool.radius;
-        auto state = std::make_shared<Layers>(Layers{scene, volume::Tissue::Reader(*scene.model.tissue), front});
-        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); }};
-    };
-    return {"layers", start, datasets::ModelLevel::spring, true};
-}
-
-namespace {
 
 using chainmail::Node;
 
@@ -293,11 +223,7 @@ struct ChainMailForce {
 
     double furthest() const noexcept
     {
-        double most = 0.0;
-        for (const Vec3f& d : u) {
-            most = std::max(most, static_cast<double>(glm::length(d)));
-        }
-        return most;
+        return base::largestOf(u, [](Vec3f d) { return static_cast<double>(glm::length(d)); });
     }
 
     MethodScene scene;
@@ -308,6 +234,65 @@ struct ChainMailForce {
 };
 
 }  // namespace
+
+// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995; on the faces of
+// voxels.
+StabilityMethod godObject()
+{
+    return {"god_object", [](const MethodScene& scene) -> RunningMethod {
+                auto god = std::make_shared<GodObject>(
+                    GodObject{scene, ContactVoxels(scene.model), volume::Tissue::Reader(*scene.model.tissue)});
+                return {[god](const haptics::DeviceSample& sample) { return god->tick(sample); }};
+            }};
+}
+
+// K d along the gradient of the distance to the surface.
+StabilityMethod penalty()
+{
+    return {"penalty", [](const MethodScene& scene) -> RunningMethod {
+                auto reader = std::make_shared<const volume::Tissue::Reader>(*scene.model.tissue);
+                const bool ball = scene.model.scene.tool.kind != datasets::ToolKind::needle;
+                const double radius = ball ? scene.model.scene.tool.radius : 0.0;
+                return {[=](const haptics::DeviceSample& sample) {
+                    const double depth = radius - scene.model.surface.distance(sample.position);
+                    if (depth <= 0.0) {
+                        return Vec3(0.0);
+                    }
+                    const Vec3 normal = scene.model.surface.normal(sample.position);
+                    const double k = contactStiffness(scene, *reader, sample.position - radius * normal, -normal);
+                    return haptics::bounded(k * depth * normal, capOf(scene));
+                }};
+            }};
+}
+
+// Source: Massie and Salisbury, "The PHANToM haptic interface: a device for probing virtual objects", ASME 1994.
+StabilityMethod superposedNormals()
+{
+    return {"superposed_normals", [](const MethodScene& scene) -> RunningMethod {
+                auto voxels = std::make_shared<const ContactVoxels>(scene.model);
+                auto reader = std::make_shared<const volume::Tissue::Reader>(*scene.model.tissue);
+                return {[=](const haptics::DeviceSample& sample) {
+                    if (!voxels->solid(voxels->voxel(sample.position))) {
+                        return Vec3(0.0);
+                    }
+                    const Vec3 depth = depthVector(*voxels, sample.position);
+                    const double k = contactStiffness(scene, *reader, sample.position, sample.axis);
+                    return haptics::bounded(k * depth, capOf(scene));
+                }};
+            }};
+}
+
+// The layer-based model of the thesis that Palpate started from.
+StabilityMethod layers()
+{
+    const auto start = [](const MethodScene& scene) -> RunningMethod {
+        const auto& tool = scene.model.scene.tool;
+        const double front = tool.kind == datasets::ToolKind::needle ? 0.0 : tool.radius;
+        auto state = std::make_shared<Layers>(Layers{scene, volume::Tissue::Reader(*scene.model.tissue), front});
+        return {[state](const haptics::DeviceSample& sample) { return state->tick(sample); }};
+    };
+    return {"layers", start, datasets::ModelLevel::spring, true};
+}
 
 // Source: Gibson, "3D ChainMail", I3D 1997: shapes that build on each other, no elastic relaxation.
 StabilityMethod chainMailForce()

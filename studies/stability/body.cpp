@@ -4,7 +4,9 @@
 
 #include <glm/common.hpp>
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 
 namespace palpate::studies {
 
@@ -29,11 +31,7 @@ std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::
                                                   {bodyGland, "gland", "gland"},
                                                   {bodyBase, "base", "bone"},
                                                   {bodyTumour, "tumour", "idc_high_grade"}}};
-    for (const auto& entry : known) {
-        if (there[entry.value]) {
-            names.push_back(entry);
-        }
-    }
+    std::ranges::copy_if(known, std::back_inserter(names), [&](const auto& entry) { return there[entry.value]; });
     return std::make_shared<const volume::Tissue>(
         volume::Tissue::fromLabels(image, table, names, {{"made by", "palpate stability"}}));
 }

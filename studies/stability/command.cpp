@@ -114,12 +114,6 @@ json runCells(const StabilityArguments& o, StabilityModels& models, command::Pro
     return base::mapped<json>(results, cellEntry);
 }
 
-json runFuzz(const StabilityArguments& o, StabilityModels& models, command::Progress& progress)
-{
-    const auto told = [&](std::size_t done) { progress.show(fmt::format("{} of {} hostile sessions", done, o.fuzz)); };
-    return fuzzEntry(fuzz(models, o.seed, o.fuzz, o.jobs, told));
-}
-
 // Throws for cells of the default method that fail.
 void checkCells(const json& cells, const StabilityModels& models)
 {
@@ -188,7 +182,8 @@ void stabilityCommand(const StabilityArguments& o)
         addTheory(figures);
     }
     if (o.fuzz > 0) {
-        figures["fuzz"] = runFuzz(o, models, progress);
+        const auto told = [&](std::size_t done) { progress.show(fmt::format("{} of {} hostile sessions", done, o.fuzz)); };
+        figures["fuzz"] = fuzzEntry(fuzz(models, o.seed, o.fuzz, o.jobs, told));
     }
     progress.clear();
     if (o.json != "-") {

@@ -61,8 +61,7 @@ struct MatrixChoice {
 class StabilityModels {
 public:
     StabilityModels();
-    StabilityModels(const StabilityModels&) = delete;
-    StabilityModels& operator=(const StabilityModels&) = delete;
+    StabilityModels& operator=(StabilityModels&&) = delete;
 
     /// Scenes beside those of the matrix: found by name, and in no list. Those that are there already are left out.
     void add(std::vector<StabilityScene> scenes);

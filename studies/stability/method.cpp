@@ -1,11 +1,15 @@
 #include <studies/stability/method.h>
 
+#include <base/folds.h>
+#include <base/mapped.h>
 #include <haptics/contact_law.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 
 namespace palpate::studies {
 
@@ -18,11 +22,8 @@ std::shared_ptr<haptics::Simulation> simulationOf(const MethodScene& scene)
 
 double furthestNode(const haptics::Simulation& simulation) noexcept
 {
-    double most = 0.0;
-    for (const auto n : simulation.shape().moved()) {
-        most = std::max(most, static_cast<double>(glm::length(simulation.shape().u()[n])));
-    }
-    return most;
+    return base::largestOf(simulation.shape().moved(),
+                           [&](auto n) { return static_cast<double>(glm::length(simulation.shape().u()[n])); });
 }
 
 // A simulation and what its last tick gave.
@@ -69,11 +70,11 @@ struct Held {
 std::vector<StabilityMethod> ourMethods()
 {
     using datasets::ModelLevel;
-    std::vector<StabilityMethod> out;
-    for (const ModelLevel level : {ModelLevel::elastic, ModelLevel::chainmail, ModelLevel::spring}) {
-        out.push_back({std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), running, level, true});
-    }
-    return out;
+    return base::mapped<StabilityMethod>(
+        std::initializer_list{ModelLevel::elastic, ModelLevel::chainmail, ModelLevel::spring}, [&](ModelLevel level) {
+            return StabilityMethod{std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), running, level,
+                                   true};
+        });
 }
 
 // Palpate's force, updated by a tissue model at 60 Hz.
@@ -90,9 +91,8 @@ StabilityMethod lateUpdates()
 std::vector<StabilityMethod> stabilityMethods()
 {
     auto all = ourMethods();
-    for (auto&& other : {superposedNormals(), godObject(), penalty(), layers(), chainMailForce(), lateUpdates()}) {
-        all.push_back(other);
-    }
+    std::ranges::move(std::array{superposedNormals(), godObject(), penalty(), layers(), chainMailForce(), lateUpdates()},
+                      std::back_inserter(all));
     return all;
 }
 

@@ -1,5 +1,6 @@
 #include <studies/stability/scene.h>
 
+#include <base/mapped.h>
 #include <studies/stability/body.h>
 
 #include <fmt/format.h>
@@ -46,9 +47,9 @@ struct MmPath {
 HandPath handPath(const MmPath& path)
 {
     HandPath out{1e-3 * path.start, haptics::settledAfter, {}};
-    for (const MmLeg& leg : path.legs) {
-        out.legs.push_back({1e-3 * leg.to, 1e-3 * leg.speed, leg.wait});
-    }
+    out.legs = base::mapped<HandLeg>(path.legs, [](const MmLeg& leg) {
+        return HandLeg{1e-3 * leg.to, 1e-3 * leg.speed, leg.wait};
+    });
     return out;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 namespace palpate::studies {
@@ -158,14 +159,10 @@ std::vector<TheoryRow> theoryRows()
             rows.push_back(delayRow(delay, damping));
         }
     }
-    for (const double damping : {0.0, 1.0, 3.0}) {
-        rows.push_back(handRow(damping));
-    }
+    std::ranges::transform(std::initializer_list{0.0, 1.0, 3.0}, std::back_inserter(rows), handRow);
     rows.push_back(longStrokeRow());
     rows.push_back(quantumRow());
-    for (const double stiffness : {400.0, 600.0, 1000.0}) {
-        rows.push_back(coulombRow(stiffness));
-    }
+    std::ranges::transform(std::initializer_list{400.0, 600.0, 1000.0}, std::back_inserter(rows), coulombRow);
     return rows;
 }
 

@@ -1,3 +1,4 @@
+#include <base/folds.h>
 #include <studies/stability/matrix.h>
 
 #include <glm/common.hpp>
@@ -5,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <span>
 
 namespace palpate::studies {
 
@@ -74,37 +77,29 @@ double restCycle(const Trace& t, Window w)
     return std::max({way.x, way.y, way.z}) / t.encoder;
 }
 
+// The part of a list by ticks that lies in the window.
+template <typename Value>
+std::span<const Value> in(Window w, const std::vector<Value>& ticks)
+{
+    return std::span(ticks).subspan(w.first, w.last - w.first);
+}
+
 double peakForce(const Trace& t, Window w)
 {
-    double most = 0.0;
-    for (std::size_t i = w.first; i < w.last; ++i) {
-        most = std::max(most, glm::length(t.force[i]));
-    }
-    return most;
+    return base::largestOf(in(w, t.force), [](Vec3 f) { return glm::length(f); });
 }
 
 // Bodies lie behind their face across y. What a controller adds against the motion on the way out is no pull.
 double pull(const Trace& t, Window w)
 {
-    double most = 0.0;
-    for (std::size_t i = w.first; i < w.last; ++i) {
-        most = std::max(most, t.tissue[i].y);
-    }
-    return 100.0 * most / t.cap;
+    return 100.0 * base::largestOf(in(w, t.tissue), &Vec3::y) / t.cap;
 }
 
 // A force F that gives way sets a mass on a spring going at F / sqrt(K m), beside the speed of the hand.
 double kick(const Trace& t, const StabilityScene& scene, Window w)
 {
-    double hand = 0.0;
-    for (const HandLeg& leg : scene.hand.legs) {
-        hand = std::max(hand, leg.speed);
-    }
-    double most = 0.0;
-    for (std::size_t i = w.first; i < w.last; ++i) {
-        most = std::max(most, t.speed[i]);
-    }
-    return 100.0 * most / (hand + peakForce(t, w) / t.handSpring);
+    const double hand = base::largestOf(scene.hand.legs, &HandLeg::speed);
+    return 100.0 * base::largestOf(in(w, t.speed), std::identity()) / (hand + peakForce(t, w) / t.handSpring);
 }
 
 // Over the whole session: what was put in before the window counts.

@@ -1,5 +1,6 @@
 #include <studies/thesis/figures.h>
 
+#include <base/mapped.h>
 #include <command/json.h>
 #include <report/chart/chart.h>
 
@@ -121,11 +122,8 @@ json modelEntry(const TaskModel& m)
 // Equation 29 from lines; nothing where an event is missing.
 json modelOf(const json& fits)
 {
-    std::vector<std::string> names;
+    const auto names = base::mapped<std::string>(fits, [](const json& f) { return f["event"]; });
     std::vector<EventLine> lines;
-    for (const auto& f : fits) {
-        names.push_back(f["event"]);
-    }
     for (std::size_t i = 0; i < names.size(); ++i) {
         lines.push_back(
             {names[i], {fits[i]["slope_us_per_object"].get<double>() / us, fits[i]["intercept_us"].get<double>() / us}});
@@ -167,30 +165,6 @@ json crossing(const json& ours, const json& loop)
     const double ahead = (*a)["intercept_us"].get<double>() - (*b)["intercept_us"].get<double>();
     return slower > 0.0 ? json(std::max(0.0, ahead / slower)) : json();
 }
-
-}  // namespace
-
-json tasksFigures(const TasksResult& r)
-{
-    constexpr auto all = static_cast<std::size_t>(-1);
-    const json fits = fitsOf(r.cases, &TasksCase::events, all), loop = fitsOf(r.cases, &TasksCase::loop, all);
-    return {{"model", r.level},
-            {"graphics", r.graphics},
-            {"cores", std::thread::hardware_concurrency()},
-            {"events", eventsOf(r.cases, &TasksCase::events)},
-            {"fits", fits},
-            {"fits_to_600", fitsOf(r.cases, &TasksCase::events, table2Most)},
-            {"timing_model", modelOf(fits)},
-            {"cases", casesOf(r.cases)},
-            {"loop",
-             {{"events", eventsOf(r.cases, &TasksCase::loop)},
-              {"fits", loop},
-              {"fits_to_600", fitsOf(r.cases, &TasksCase::loop, table2Most)},
-              {"as_slow_as_ours_at_objects", crossing(fits, loop)}}},
-            {"thesis", thesisEntry()}};
-}
-
-namespace {
 
 // Rows: numbers of objects; columns: events.
 void printTable(const json& events, const char* title)
@@ -268,32 +242,6 @@ void printCases(const json& cases)
     }
 }
 
-}  // namespace
-
-void printTasks(const json& f)
-{
-    fmt::print("level {}; graphics: {}; {} cores\n", f["model"].get<std::string>(), f["graphics"].get<std::string>(),
-               f["cores"].get<int>());
-    printTable(f["events"], "process time of a tick by event [us]");
-    printTable(f["loop"]["events"], "the same with a loop over objects, as the thesis had it [us]");
-    printTable(f["thesis"]["events"], "the thesis, Table 2 [us]");
-    fmt::print("\nleast squares, as Table 4 [us]\n{:<28} {:<4} {:>23} {:>19} {:>7}\n", "", "", "slope per object",
-               "intercept", "R^2");
-    printFits("ours", f["fits"]);
-    printFits("ours, up to 600 objects", f["fits_to_600"]);
-    printFits("loop over objects", f["loop"]["fits"]);
-    printFits("thesis, Table 4", f["thesis"]["fits"]);
-    printFits("thesis, Table 2 fitted again", f["thesis"]["fits_of_table_2"]);
-    printModel(f["timing_model"], f["thesis"]["timing_model"]);
-    printCases(f["cases"]);
-    if (const auto& at = f["loop"]["as_slow_as_ours_at_objects"]; !at.is_null()) {
-        fmt::print("\na loop over objects is as slow as level {} at {:.3g} objects (lines of A8)\n",
-                   f["model"].get<std::string>(), at.get<double>());
-    }
-}
-
-namespace {
-
 report::ChartSeries timesOf(const json& events, const char* event, std::string name)
 {
     report::ChartSeries s{std::move(name), {}, {}, true};
@@ -363,6 +311,48 @@ report::Chart tasksChartOf(const json& f)
 }
 
 }  // namespace
+
+json tasksFigures(const TasksResult& r)
+{
+    constexpr auto all = static_cast<std::size_t>(-1);
+    const json fits = fitsOf(r.cases, &TasksCase::events, all), loop = fitsOf(r.cases, &TasksCase::loop, all);
+    return {{"model", r.level},
+            {"graphics", r.graphics},
+            {"cores", std::thread::hardware_concurrency()},
+            {"events", eventsOf(r.cases, &TasksCase::events)},
+            {"fits", fits},
+            {"fits_to_600", fitsOf(r.cases, &TasksCase::events, table2Most)},
+            {"timing_model", modelOf(fits)},
+            {"cases", casesOf(r.cases)},
+            {"loop",
+             {{"events", eventsOf(r.cases, &TasksCase::loop)},
+              {"fits", loop},
+              {"fits_to_600", fitsOf(r.cases, &TasksCase::loop, table2Most)},
+              {"as_slow_as_ours_at_objects", crossing(fits, loop)}}},
+            {"thesis", thesisEntry()}};
+}
+
+void printTasks(const json& f)
+{
+    fmt::print("level {}; graphics: {}; {} cores\n", f["model"].get<std::string>(), f["graphics"].get<std::string>(),
+               f["cores"].get<int>());
+    printTable(f["events"], "process time of a tick by event [us]");
+    printTable(f["loop"]["events"], "the same with a loop over objects, as the thesis had it [us]");
+    printTable(f["thesis"]["events"], "the thesis, Table 2 [us]");
+    fmt::print("\nleast squares, as Table 4 [us]\n{:<28} {:<4} {:>23} {:>19} {:>7}\n", "", "", "slope per object",
+               "intercept", "R^2");
+    printFits("ours", f["fits"]);
+    printFits("ours, up to 600 objects", f["fits_to_600"]);
+    printFits("loop over objects", f["loop"]["fits"]);
+    printFits("thesis, Table 4", f["thesis"]["fits"]);
+    printFits("thesis, Table 2 fitted again", f["thesis"]["fits_of_table_2"]);
+    printModel(f["timing_model"], f["thesis"]["timing_model"]);
+    printCases(f["cases"]);
+    if (const auto& at = f["loop"]["as_slow_as_ours_at_objects"]; !at.is_null()) {
+        fmt::print("\na loop over objects is as slow as level {} at {:.3g} objects (lines of A8)\n",
+                   f["model"].get<std::string>(), at.get<double>());
+    }
+}
 
 void writeTasksChart(const json& figures, const std::filesystem::path& png)
 {

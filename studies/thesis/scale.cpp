@@ -153,10 +153,8 @@ public:
     /// Windows of 2 mm spacing, with the cycles of the model; where it has none, of the fast one.
     Largest nodes(const Model& model, double bound)
     {
-        datasets::ModelSettings settings = elastic("fast").settings;
-        if (model.settings.level == datasets::ModelLevel::elastic) {
-            settings = model.settings;
-        }
+        const bool own = model.settings.level == datasets::ModelLevel::elastic;
+        datasets::ModelSettings settings = own ? model.settings : elastic("fast").settings;
         settings.elastic.spacing = windowSpacing;
         return grow(
             1, (lastWindow - firstWindow) / 2 + 1, bound,

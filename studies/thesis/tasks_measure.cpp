@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <numbers>
 #include <numeric>
 #include <thread>
@@ -337,9 +338,7 @@ std::vector<EventTimes> timeEvents(SessionModel& model, std::span<const TaskEven
         if (graphics != nullptr && !session.awaitViewer()) {
             return;
         }
-        for (const TaskEvent& event : events) {
-            out.push_back(session.time(event, options));
-        }
+        std::ranges::transform(events, std::back_inserter(out), [&](const auto& e) { return session.time(e, options); });
     });
     return out;
 }
@@ -350,9 +349,7 @@ std::vector<EventTimes> timeEvents(const ObjectScene& scene, const datasets::Dff
     std::vector<EventTimes> out;
     inRealTime([&] {
         ObjectLoop loop(scene, dffb);
-        for (const TaskEvent& event : events) {
-            out.push_back(loop.time(event, options));
-        }
+        std::ranges::transform(events, std::back_inserter(out), [&](const auto& e) { return loop.time(e, options); });
     });
     return out;
 }

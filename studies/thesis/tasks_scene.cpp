@@ -1,6 +1,7 @@
 #include <studies/thesis/tasks_scene.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/phantom_random.h>
 #include <datasets/tables.h>
 
@@ -117,12 +118,9 @@ int voxelsFor(std::size_t inclusions) noexcept
 std::vector<PlacedInclusion> inclusionsOf(const InclusionSpec& spec)
 {
     const auto affine = affineOf(sideOf(spec));
-    std::vector<PlacedInclusion> out;
-    out.reserve(spec.inclusions);
-    for (const Ball& b : ballsOf(spec)) {
-        out.push_back({affine.toPatient(Vec3(b.centre + airVoxels)), b.radius * affine.spacing().x});
-    }
-    return out;
+    return base::mapped<PlacedInclusion>(ballsOf(spec), [&](const Ball& b) {
+        return PlacedInclusion{affine.toPatient(Vec3(b.centre + airVoxels)), b.radius * affine.spacing().x};
+    });
 }
 
 volume::LabelImage inclusionLabels(const InclusionSpec& spec)

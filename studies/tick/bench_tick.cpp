@@ -11,6 +11,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <random>
 
@@ -138,9 +139,8 @@ std::vector<QueryCase> benchQuery(int elementsPerSide)
         if (deformed) {
             cube.press();
         }
-        for (const Tool& tool : tools) {
-            cases.push_back(timeCase(cube.body(), tool, deformed));
-        }
+        std::ranges::transform(tools, std::back_inserter(cases),
+                               [&](auto& tool) { return timeCase(cube.body(), tool, deformed); });
     }
     return cases;
 }

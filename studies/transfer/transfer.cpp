@@ -139,8 +139,7 @@ public:
             ::_exit(0);
         }
     }
-    Receiver(const Receiver&) = delete;
-    Receiver& operator=(const Receiver&) = delete;
+    Receiver& operator=(Receiver&&) = delete;
     ~Receiver()
     {
         seen_->stop = true;

@@ -1,3 +1,4 @@
+#include <base/folds.h>
 #include <studies/validate/experiment.h>
 
 #include <base/error.h>
@@ -9,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 
 namespace palpate::studies {
@@ -67,11 +69,7 @@ struct MeasuredDrop {
     std::array<std::vector<double>, 3> runs;
     double mean(std::size_t marker) const
     {
-        double sum = 0.0;
-        for (const double run : runs[marker]) {
-            sum += run;
-        }
-        return sum / static_cast<double>(runs[marker].size());
+        return base::sumOf(runs[marker], std::identity()) / static_cast<double>(runs[marker].size());
     }
 };
 
@@ -187,11 +185,11 @@ Experiment siliconeBeam(const std::filesystem::path& file, bool quick, const Val
     e.parameters.emplace_back("youngs_kpa", 1e-3 * beam.youngsModulus);
     e.picture = {"Silicone beam", "tip load [N]", "drop of a marker [mm]", {}};
     std::vector<double> errors;
-    for (std::size_t m = 0; m < markers.size(); ++m) {
-        e.picture.curves.push_back({fmt::format("marker {}, measured", m), {}, {}, false});
-    }
-    for (std::size_t m = 0; m < markers.size(); ++m) {
-        e.picture.curves.push_back({fmt::format("marker {}, predicted", m), {}, {}, true});
+    for (const bool predicted : {false, true}) {
+        for (std::size_t m = 0; m < markers.size(); ++m) {
+            const char* const what = predicted ? "predicted" : "measured";
+            e.picture.curves.push_back({fmt::format("marker {}, {}", m, what), {}, {}, predicted});
+        }
     }
     for (const MeasuredDrop& drop : drops) {
         beam.tipLoad = drop.tipLoad;

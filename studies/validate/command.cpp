@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <studies/commands.h>
 
 #include <base/error.h>
@@ -19,6 +20,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 namespace palpate::studies {
@@ -138,10 +140,9 @@ void checkVerdicts(const std::vector<Experiment>& experiments)
             (e.verdict == Verdict::fails ? failed : missing).push_back(e.name);
         }
     }
-    std::string what;
-    if (!failed.empty()) {
-        what = fmt::format("{} of {} experiments fail: {}", failed.size(), experiments.size(), fmt::join(failed, ", "));
-    }
+    std::string what = failed.empty() ? ""
+                                      : fmt::format("{} of {} experiments fail: {}", failed.size(), experiments.size(),
+                                                    fmt::join(failed, ", "));
     if (!missing.empty()) {
         what += fmt::format("{}not run (name the experiments that you want): {}", what.empty() ? "" : "; ",
                             fmt::join(missing, ", "));
@@ -154,12 +155,7 @@ std::vector<std::filesystem::path> inputsOf(const ValidateArguments& o)
 {
     std::vector<std::filesystem::path> inputs{o.tissues};
     for (const auto& folder : measurementFolders(o.data)) {
-        std::error_code none;
-        for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-            if (entry.path().extension() == ".csv") {
-                inputs.push_back(entry.path());
-            }
-        }
+        std::ranges::move(base::filesWith(".csv", folder), std::back_inserter(inputs));
     }
     return inputs;
 }

@@ -343,31 +343,6 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     return e;
 }
 
-}  // namespace
-
-volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const std::vector<double>& ratios)
-{
-    double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
-    for (std::size_t i = 0; i < seconds.size(); ++i) {
-        const double a = -std::expm1(-seconds[i] / volume::relaxationTimes[0]);
-        const double b = -std::expm1(-seconds[i] / volume::relaxationTimes[1]);
-        const double y = 1.0 - ratios[i];
-        aa += a * a;
-        ab += a * b;
-        bb += b * b;
-        ay += a * y;
-        by += b * y;
-    }
-    const double determinant = aa * bb - ab * ab;
-    const double fast = (ay * bb - by * ab) / determinant, slow = (by * aa - ay * ab) / determinant;
-    if (fast < 0.0) {
-        return {{0.0, std::max(by / bb, 0.0)}};
-    }
-    return slow < 0.0 ? volume::Relaxation{{std::max(ay / aa, 0.0), 0.0}} : volume::Relaxation{{fast, slow}};
-}
-
-namespace {
-
 // Insertions at places that are `placesApart` from each other; the first of them is held.
 std::vector<NeedleStroke> strokesIn(const LiverLaw& liver, double depth, const std::vector<double>& heldAt)
 {
@@ -392,6 +367,27 @@ std::vector<double> meanTipForce(const std::vector<NeedleStroke>& strokes)
 }
 
 }  // namespace
+
+volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const std::vector<double>& ratios)
+{
+    double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
+    for (std::size_t i = 0; i < seconds.size(); ++i) {
+        const double a = -std::expm1(-seconds[i] / volume::relaxationTimes[0]);
+        const double b = -std::expm1(-seconds[i] / volume::relaxationTimes[1]);
+        const double y = 1.0 - ratios[i];
+        aa += a * a;
+        ab += a * b;
+        bb += b * b;
+        ay += a * y;
+        by += b * y;
+    }
+    const double determinant = aa * bb - ab * ab;
+    const double fast = (ay * bb - by * ab) / determinant, slow = (by * aa - ay * ab) / determinant;
+    if (fast < 0.0) {
+        return {{0.0, std::max(by / bb, 0.0)}};
+    }
+    return slow < 0.0 ? volume::Relaxation{{std::max(ay / aa, 0.0), 0.0}} : volume::Relaxation{{fast, slow}};
+}
 
 std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const std::filesystem::path& hold,
                                       const ValidateProgress& progress)

@@ -7,8 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <iterator>
 #include <numbers>
+#include <ranges>
 
 namespace palpate::studies {
 
@@ -134,9 +135,9 @@ std::vector<double> swinging(double frequency)
 {
     std::vector<double> depths = pressAndHold(0.0);
     const auto ticks = static_cast<int>(std::lround(turns / frequency / reliefTick));
-    for (int i = 1; i <= ticks; ++i) {
-        depths.push_back(depth - swing + swing * std::cos(2.0 * std::numbers::pi * frequency * i * reliefTick));
-    }
+    std::ranges::transform(std::views::iota(1, ticks + 1), std::back_inserter(depths), [&](int i) {
+        return depth - swing + swing * std::cos(2.0 * std::numbers::pi * frequency * i * reliefTick);
+    });
     return depths;
 }
 

@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <studies/validate/experiment.h>
 
 #include <base/error.h>
@@ -10,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <numbers>
 
 namespace palpate::studies {
@@ -176,12 +178,6 @@ std::vector<double> inPercent(std::vector<double> values)
     return values;
 }
 
-void addToPicture(ValidatePicture& picture, const Material& m, const Prediction& p)
-{
-    picture.curves.push_back({m.name + ", measured", inPercent(m.strain), m.load, false});
-    picture.curves.push_back({m.name + ", predicted", inPercent(m.strain), p.load, true});
-}
-
 Experiment loadExperiment(const std::vector<Material>& all, const LoadCurves& curves, bool bonded, bool yeoh)
 {
     Experiment e;
@@ -212,7 +208,9 @@ Experiment loadExperiment(const std::vector<Material>& all, const LoadCurves& cu
         }
         e.parameters.emplace_back(all[i].name + "_rms_pct", own.rms);
         if (i % 4 == 0) {
-            addToPicture(e.picture, all[i], p);
+            const std::vector<double> strain = inPercent(all[i].strain);
+            e.picture.curves.push_back({all[i].name + ", measured", strain, all[i].load, false});
+            e.picture.curves.push_back({all[i].name + ", predicted", strain, p.load, true});
         }
     }
     const double mean = summaryOf(everything).rms;
@@ -253,9 +251,7 @@ Experiment ratioExperiment(const Cylinder& shape)
             {isBonded ? "kernel, bonded" : "kernel, no friction", inPercent(strains), std::move(loads), true});
     }
     ValidateCurve exact{"closed form, no friction", inPercent(strains), {}, false};
-    for (const double strain : strains) {
-        exact.y.push_back(-uniaxialStress({1.0, 0.0}, 1.0 - strain));
-    }
+    exact.y = base::mapped<double>(strains, [](double strain) { return -uniaxialStress({1.0, 0.0}, 1.0 - strain); });
     e.picture.curves.push_back(std::move(exact));
     e.judge();
     return e;
@@ -358,9 +354,8 @@ std::vector<Experiment> siliconeCompression(const std::filesystem::path& file, b
     for (const bool bonded : {false, true}) {
         progress(bonded ? "silicone: bonded" : "silicone: without friction");
         const LoadCurves curves(shape, bonded, all.front().strain);
-        for (const bool yeoh : {false, true}) {
-            out.push_back(loadExperiment(all, curves, bonded, yeoh));
-        }
+        std::ranges::transform(std::initializer_list{false, true}, std::back_inserter(out),
+                               [&](bool yeoh) { return loadExperiment(all, curves, bonded, yeoh); });
     }
     progress("silicone: ratio");
     out.push_back(ratioExperiment(shape));

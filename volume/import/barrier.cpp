@@ -55,8 +55,7 @@ public:
             ended();
         }
     }
-    Receiver(const Receiver&) = delete;
-    Receiver& operator=(const Receiver&) = delete;
+    Receiver& operator=(Receiver&&) = delete;
 
     /// Waits for the child's end; how it was.
     int ended()

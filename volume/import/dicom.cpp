@@ -46,14 +46,11 @@ Objects chosen(const std::filesystem::path& path, const Files& files, const std:
     refuseIf(series.empty(), path, "holds DICOM files, but none with pixels: name a folder with one series");
     if (!wanted.empty()) {
         const auto found = series.find(wanted);
-        if (found == series.end()) {
-            refuse(path, "--series {} is not there: name one of these: {}", wanted, listOf(series));
-        }
+        refuseIf(found == series.end(), path, "--series {} is not there: name one of these: {}", wanted, listOf(series));
         return std::move(found->second);
     }
-    if (series.size() > 1) {
-        refuse(path, "holds {} series: say which with --series, or name one file: {}", series.size(), listOf(series));
-    }
+    refuseIf(series.size() > 1, path, "holds {} series: say which with --series, or name one file: {}", series.size(),
+             listOf(series));
     return std::move(series.begin()->second);
 }
 

@@ -73,9 +73,7 @@ void loadDicom(const std::filesystem::path& file, DcmFileFormat& format)
     refuseIf(!uid.empty() && DcmXfer(uid.c_str()).getXfer() == EXS_Unknown, file,
              "its transfer syntax {}{} is not read: decompress it", uid, nameOf(uid));
     const OFCondition status = format.loadFile(file.c_str());
-    if (status.bad()) {
-        refuse(file, "its DICOM cannot be read ({}): get the file again", trimmedText(status.text()));
-    }
+    refuseIf(status.bad(), file, "its DICOM cannot be read ({}): get the file again", trimmedText(status.text()));
 }
 
 std::vector<std::byte> unpackedRle(std::span<const std::byte> frame, std::size_t wanted)

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cstring>
 #include <mutex>
+#include <utility>
 
 namespace palpate::volume {
 
@@ -47,7 +48,13 @@ struct DicomPixels::Data {
 
     explicit Data(const DicomObject& o) : object(o) {}
 
-    [[noreturn]] void fail(const std::string& why) const { refuse(object.file, "{}: get the file again", why); }
+    template <typename... Values>
+    void failIf(bool wrong, fmt::format_string<Values...> why, Values&&... values) const
+    {
+        if (wrong) {
+            refuse(object.file, "{}: get the file again", fmt::format(why, std::forward<Values>(values)...));
+        }
+    }
 
     std::uint64_t frameBits() const { return object.pixelsPerFrame() * static_cast<std::uint64_t>(object.bitsAllocated); }
 
@@ -69,15 +76,13 @@ void DicomPixels::Data::open()
     registerCodecs();
     loadDicom(object.file, format);
     DcmElement* element = nullptr;
-    if (format.getDataset()->findAndGetElement(DCM_PixelData, element).bad() ||
-        (pixels = dynamic_cast<DcmPixelData*>(element)) == nullptr) {
-        fail("it has no pixels");
-    }
+    failIf(format.getDataset()->findAndGetElement(DCM_PixelData, element).bad() ||
+               (pixels = dynamic_cast<DcmPixelData*>(element)) == nullptr,
+           "it has no pixels");
     const DcmRepresentationParameter* parameter = nullptr;
     pixels->getOriginalRepresentationKey(syntax, parameter);
-    if (DcmXfer(syntax).isEncapsulated() && pixels->getEncapsulatedRepresentation(syntax, parameter, fragments).bad()) {
-        fail("its compressed pixels cannot be found");
-    }
+    failIf(DcmXfer(syntax).isEncapsulated() && pixels->getEncapsulatedRepresentation(syntax, parameter, fragments).bad(),
+           "its compressed pixels cannot be found");
     checkSize();
     values.resize(object.pixelsPerFrame());
 }
@@ -88,18 +93,14 @@ void DicomPixels::Data::checkSize() const
     if (fragments != nullptr) {
         // The first item is the table of offsets.
         const std::size_t there = fragments->card() > 0 ? fragments->card() - 1 : 0;
-        if (there < object.frames.size()) {
-            fail(fmt::format("its header promises {} frames, but there are {} compressed ones", object.frames.size(),
-                             there));
-        }
+        failIf(there < object.frames.size(), "its header promises {} frames, but there are {} compressed ones",
+               object.frames.size(), there);
         return;
     }
     const std::uint64_t wanted = (frameBits() * object.frames.size() + 7) / 8;
     const std::uint64_t there = pixels->getLengthField();
-    if (there < wanted) {
-        fail(fmt::format("its header promises {} x {} x {} pixels of {} bits, {} bytes in all, but there are {}",
-                         object.columns, object.rows, object.frames.size(), object.bitsAllocated, wanted, there));
-    }
+    failIf(there < wanted, "its header promises {} x {} x {} pixels of {} bits, {} bytes in all, but there are {}",
+           object.columns, object.rows, object.frames.size(), object.bitsAllocated, wanted, there);
 }
 
 // The bytes of one compressed frame: one fragment, or all of a single frame's.
@@ -107,17 +108,14 @@ std::vector<std::byte> DicomPixels::Data::codeStream(std::size_t index) const
 {
     const std::size_t there = fragments->card() - 1;
     const bool single = object.frames.size() == 1;
-    if (!single && there != object.frames.size()) {
-        fail("its compressed frames are in several pieces each, which is not read");
-    }
+    failIf(!single && there != object.frames.size(), "its compressed frames are in several pieces each, which is not read");
     std::vector<std::byte> stream;
     for (std::size_t i = single ? 0 : index; i < (single ? there : index + 1); ++i) {
         DcmPixelItem* item = nullptr;
         Uint8* bytes = nullptr;
-        if (fragments->getItem(item, static_cast<unsigned long>(i + 1)).bad() || item->getUint8Array(bytes).bad() ||
-            bytes == nullptr) {
-            fail("its compressed pixels cannot be read");
-        }
+        failIf(fragments->getItem(item, static_cast<unsigned long>(i + 1)).bad() || item->getUint8Array(bytes).bad() ||
+                   bytes == nullptr,
+               "its compressed pixels cannot be read");
         const auto* first = reinterpret_cast<const std::byte*>(bytes);
         stream.insert(stream.end(), first, first + item->getLength());
     }
@@ -142,9 +140,7 @@ void DicomPixels::Data::checkRle(std::size_t index) const
     for (std::size_t i = 2; sound && i <= segments; ++i) {
         sound = number(i) > number(i - 1) && number(i) < stream.size();
     }
-    if (!sound) {
-        fail("its RLE data are damaged, their segments lie outside of them");
-    }
+    failIf(!sound, "its RLE data are damaged, their segments lie outside of them");
 }
 
 void DicomPixels::Data::readPlain(std::size_t index)
@@ -156,15 +152,10 @@ void DicomPixels::Data::readPlain(std::size_t index)
     buffer.resize(values.size() * width + values.size() * width % 2);
     Uint32 fragment = 0;
     OFString colours;
-    if (pixels
-            ->getUncompressedFrame(format.getDataset(), static_cast<Uint32>(index), fragment, buffer.data(),
-                                   static_cast<Uint32>(buffer.size()), colours)
-            .bad()) {
-        if (fragments != nullptr) {
-            fail(fmt::format("its pixels ({}) cannot be decoded", DcmXfer(syntax).getXferName()));
-        }
-        fail("its pixels cannot be read");
-    }
+    const auto read = pixels->getUncompressedFrame(format.getDataset(), static_cast<Uint32>(index), fragment, buffer.data(),
+                                                   static_cast<Uint32>(buffer.size()), colours);
+    failIf(read.bad() && fragments != nullptr, "its pixels ({}) cannot be decoded", DcmXfer(syntax).getXferName());
+    failIf(read.bad(), "its pixels cannot be read");
     for (std::size_t i = 0; i < values.size(); ++i) {
         Uint16 two = buffer[i * width];
         if (width == 2) {
@@ -188,9 +179,7 @@ void DicomPixels::Data::readDeflated(std::size_t index)
 {
     const std::size_t width = static_cast<std::size_t>(object.bitsAllocated) / 8;
     const std::vector<std::byte> bytes = inflated(codeStream(index), values.size() * width);
-    if (bytes.size() < values.size() * width) {
-        fail(fmt::format("the deflated data of frame {} are damaged", index + 1));
-    }
+    failIf(bytes.size() < values.size() * width, "the deflated data of frame {} are damaged", index + 1);
     for (std::size_t i = 0; i < values.size(); ++i) {
         const auto byte = [&](std::size_t k) { return std::to_integer<std::int32_t>(bytes[i * width + k]); };
         values[i] = (byte(0) | (width == 2 ? byte(1) << 8 : 0)) >> (object.highBit + 1 - object.bitsStored);
@@ -226,9 +215,8 @@ void DicomPixels::Data::readCompressedBits(std::size_t index)
         refuse(object.file, "its pixels of one bit are compressed as {} ({}), which is not read: decompress it",
                DcmXfer(syntax).getXferName(), object.syntax);
     }
-    if (packed.size() < wanted) {
-        fail(fmt::format("frame {} has {} bytes of pixels of one bit, but needs {}", index + 1, packed.size(), wanted));
-    }
+    failIf(packed.size() < wanted, "frame {} has {} bytes of pixels of one bit, but needs {}", index + 1, packed.size(),
+           wanted);
     unpackBits(packed.data(), 0);
 }
 
@@ -240,9 +228,7 @@ void DicomPixels::Data::readBits(std::size_t index)
         return;
     }
     Uint8* bytes = nullptr;
-    if (pixels->getUint8Array(bytes).bad() || bytes == nullptr) {
-        fail("its pixels cannot be read");
-    }
+    failIf(pixels->getUint8Array(bytes).bad() || bytes == nullptr, "its pixels cannot be read");
     unpackBits(reinterpret_cast<const std::byte*>(bytes), index * values.size());
 }
 

@@ -65,9 +65,7 @@ Grid gridOf(const DicomObject& object)
     const DicomFrame& any = object.frames[0];
     const Vec3 normal = glm::cross(any.alongRow, any.alongColumn);
     Grid grid;
-    for (const DicomFrame& f : object.frames) {
-        grid.frames.push_back({&f, 0});
-    }
+    grid.frames = base::mapped<Placed>(object.frames, [](const DicomFrame& f) { return Placed{&f, 0}; });
     const auto height = [&](const Placed& p) { return glm::dot(normal, p.frame->position); };
     std::stable_sort(grid.frames.begin(), grid.frames.end(),
                      [&](const Placed& a, const Placed& b) { return height(a) < height(b); });
@@ -76,16 +74,14 @@ Grid gridOf(const DicomObject& object)
     const Vec3 origin = grid.frames[0].frame->position;
     for (Placed& p : grid.frames) {
         const double steps = (height(p) - heights[0]) / spacing;
-        if (!(steps < 32767)) {
-            refuse(object.file, "its frames are up to {:.4g} mm apart: the positions are wrong, export it again",
-                   1e3 * (heights.back() - heights[0]));
-        }
+        refuseIf(!(steps < 32767), object.file,
+                 "its frames are up to {:.4g} mm apart: the positions are wrong, export it again",
+                 1e3 * (heights.back() - heights[0]));
         p.slice = std::llround(steps);
         const Vec3 expected = origin + static_cast<double>(p.slice) * spacing * normal;
-        if (glm::length(p.frame->position - expected) > std::max(2e-5, 0.05 * spacing)) {
-            refuse(object.file, "frame {} is {:.3g} mm off the grid of the others: export it again on one grid",
-                   p.frame->index + 1, 1e3 * glm::length(p.frame->position - expected));
-        }
+        refuseIf(glm::length(p.frame->position - expected) > std::max(2e-5, 0.05 * spacing), object.file,
+                 "frame {} is {:.3g} mm off the grid of the others: export it again on one grid", p.frame->index + 1,
+                 1e3 * glm::length(p.frame->position - expected));
     }
     const std::int64_t slices = grid.frames.back().slice + 1;
     refuseIf(slices > 64 * (static_cast<std::int64_t>(object.frames.size()) + 16), object.file,

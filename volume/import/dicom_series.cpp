@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <volume/import/dicom_file.h>
 
 #include <glm/geometric.hpp>
@@ -38,13 +39,11 @@ void checkAlike(const std::filesystem::path& path, const std::vector<Slice>& sli
                  "{} does not say where its slice is (position, orientation or pixel spacing is missing): "
                  "export it again, or leave the file out",
                  nameOf(slice));
-        if (slice.object->columns != slices[0].object->columns || slice.object->rows != slices[0].object->rows) {
-            refuse(path,
-                   "its slices have different sizes: {} x {} in {}, {} x {} in {}: put each series into a folder "
-                   "of its own",
-                   slices[0].object->columns, slices[0].object->rows, nameOf(slices[0]), slice.object->columns,
-                   slice.object->rows, nameOf(slice));
-        }
+        refuseIf(slice.object->columns != slices[0].object->columns || slice.object->rows != slices[0].object->rows, path,
+                 "its slices have different sizes: {} x {} in {}, {} x {} in {}: put each series into a folder "
+                 "of its own",
+                 slices[0].object->columns, slices[0].object->rows, nameOf(slices[0]), slice.object->columns,
+                 slice.object->rows, nameOf(slice));
         if (glm::length(f.alongRow - first.alongRow) > sameDirection ||
             glm::length(f.alongColumn - first.alongColumn) > sameDirection) {
             refuse(path,
@@ -117,11 +116,10 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
     const double tolerance = std::max(2e-5, 0.05 * usual);
     for (std::size_t i = 0; i < slices.size(); ++i) {
         const Vec3 expected = slices.front().frame->position + static_cast<double>(i) * step;
-        if (glm::length(slices[i].frame->position - expected) > tolerance) {
-            refuse(path, "its slices are uneven: from {} to {} apart, {} is {} off: resample it to even slices first",
-                   lengthText(sorted.front()), lengthText(sorted.back()), nameOf(slices[i]),
-                   lengthText(glm::length(slices[i].frame->position - expected)));
-        }
+        refuseIf(glm::length(slices[i].frame->position - expected) > tolerance, path,
+                 "its slices are uneven: from {} to {} apart, {} is {} off: resample it to even slices first",
+                 lengthText(sorted.front()), lengthText(sorted.back()), nameOf(slices[i]),
+                 lengthText(glm::length(slices[i].frame->position - expected)));
     }
     return step;
 }
@@ -151,9 +149,7 @@ void readPixels(const std::vector<Slice>& slices, const std::function<void(doubl
         if (i == 0) {
             values.reserve(slices.size() * stored.size());
         }
-        for (const std::int32_t v : stored) {
-            values.push_back(static_cast<float>(frame.slope * v + frame.intercept));
-        }
+        values = base::mapped<float>(stored, [&](std::int32_t v) { return frame.slope * v + frame.intercept; });
         if (progress) {
             progress(static_cast<double>(i + 1) / static_cast<double>(slices.size()));
         }

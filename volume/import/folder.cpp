@@ -28,10 +28,8 @@ Files filesIn(const std::filesystem::path& folder)
 // "liver" of liver.nii.gz.
 std::string structureName(const std::filesystem::path& file)
 {
-    std::string name = file.filename().string();
-    if (lowerCase(file.extension().string()) == ".gz") {
-        name = file.stem().string();
-    }
+    const bool packed = lowerCase(file.extension().string()) == ".gz";
+    const std::string name = (packed ? file.stem() : file.filename()).string();
     return printable(name.substr(0, name.rfind('.')));
 }
 
@@ -70,13 +68,11 @@ void checkSameGrid(const Source& first, const Source& other)
 {
     const bool sameSize = first.size == other.size;
     const double apart = voxelsApart(first.affine, other.affine, first.size);
-    if (!sameSize || !(apart < 0.01)) {
-        refuse(other.header,
-               "is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
-               "apart): masks of one folder must share a grid, resample it or leave it out",
-               first.header.filename().string(), other.size.x, other.size.y, other.size.z, first.size.x, first.size.y,
-               first.size.z, apart);
-    }
+    refuseIf(!sameSize || !(apart < 0.01), other.header,
+             "is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
+             "apart): masks of one folder must share a grid, resample it or leave it out",
+             first.header.filename().string(), other.size.x, other.size.y, other.size.z, first.size.x, first.size.y,
+             first.size.z, apart);
 }
 
 ImportedLabels masks(const std::filesystem::path& folder, const Files& files, const ImportOptions& options)
@@ -89,9 +85,7 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
         chooseVolume(source, options);
         placeAxes(source, options);
         checkAffine(files[i], source.affine, options.sheared, source.warnings);
-        if (source.layers > 1) {
-            refuse(files[i], "has layers of segments, so it is no mask: name this file alone");
-        }
+        refuseIf(source.layers > 1, files[i], "has layers of segments, so it is no mask: name this file alone");
         if (i == 0) {
             first = source;
             out.warnings = source.warnings;

@@ -1,7 +1,9 @@
+#include <base/mapped.h>
 #include <volume/grids.h>
 #include <volume/import/dicom.h>
 #include <volume/import/label_sink.h>
 
+#include <fmt/ranges.h>
 #include <openvdb/io/File.h>
 
 #include <mutex>
@@ -26,11 +28,9 @@ openvdb::GridBase::Ptr onlyGrid(const std::filesystem::path& file)
     refuseIf((*vdb.getMetadata())["palpate_volume"] != nullptr, file, "is a volume already: 'palpate info' shows it");
     const openvdb::GridPtrVecPtr grids = vdb.readAllGridMetadata();
     if (grids->size() != 1) {
-        std::string names;
-        for (const auto& grid : *grids) {
-            names += (names.empty() ? "" : ", ") + grid->getName();
-        }
-        refuse(file, "holds {} grids ({}): save it with the one that holds the labels", grids->size(), names);
+        const auto names = base::mapped<std::string>(*grids, [](const auto& grid) { return grid->getName(); });
+        refuse(file, "holds {} grids ({}): save it with the one that holds the labels", grids->size(),
+               fmt::join(names, ", "));
     }
     return vdb.readGrid(grids->front()->getName());
 }

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <iterator>
 #include <optional>
 
 namespace palpate::volume {
@@ -54,84 +55,6 @@ Mat3 frameOf(const std::string& axes)
     return frame;
 }
 
-}  // namespace
-
-Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_t> sizes, Source& source)
-{
-    if (sizes.size() <= 3) {
-        return checkedSize(file, sizes);
-    }
-    std::uint64_t volumes = 1;
-    for (std::size_t i = 3; i < sizes.size(); ++i) {
-        refuseIf(sizes[i] < 1 || sizes[i] > 32767 || volumes > 32767, file,
-                 "its size is {}: each side must be 1 to 32767, save it again", fmt::join(sizes, " x "));
-        volumes *= static_cast<std::uint64_t>(sizes[i]);
-    }
-    source.dimensions = fmt::format("{}", fmt::join(sizes, " x "));
-    sizes.resize(3);
-    const Index3 size = checkedSize(file, sizes);
-    source.volumes = volumes;
-    source.volumeInner = static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]);
-    return size;
-}
-
-void chooseVolume(Source& source, const ImportOptions& options)
-{
-    if (options.volume > 0 && source.layers > 1) {
-        std::swap(source.volumes, source.layers);
-        source.volumeInner = source.inner;
-        source.inner = 1;
-        std::erase_if(source.segments,
-                      [&](const SegmentName& s) { return s.layer + 1 != static_cast<std::uint64_t>(options.volume); });
-    }
-    if (static_cast<std::uint64_t>(options.volume) > source.volumes) {
-        refuse(source.header, "--volume {}: it holds {}", options.volume,
-               source.volumes == 1 ? "one volume" : fmt::format("{} volumes", source.volumes));
-    }
-    refuseIf(source.volumes > 1 && options.volume == 0, source.header,
-             "holds {} volumes, or as many values per voxel ({}): choose one with --volume N, or --image-volume N "
-             "where it is the image",
-             source.volumes, source.dimensions);
-    source.volume = source.volumes > 1 ? static_cast<std::uint64_t>(options.volume) - 1 : 0;
-}
-
-void refuseAxes(const std::filesystem::path& file, const ImportOptions& options)
-{
-    refuseIf(!options.axes.empty() && !options.axesIfUnsaid, file,
-             "--axes {}: it says itself where its axes run: leave --axes out", options.axes);
-}
-
-void refuseVolume(const std::filesystem::path& file, const ImportOptions& options)
-{
-    refuseIf(options.volume > 1, file, "--volume {}: it holds one volume", options.volume);
-}
-
-void placeAxes(Source& source, const ImportOptions& options)
-{
-    if (source.oriented) {
-        refuseAxes(source.header, options);
-    } else if (source.assumed && options.axes.empty()) {
-        source.affine = *source.assumed;
-    } else {
-        placeAxes(options, source.affine, source.warnings);
-    }
-}
-
-void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::string>& warnings)
-{
-    if (options.axes.empty()) {
-        warnings.emplace_back(
-            "it does not say which side is left: its axes are taken as left, posterior, superior; --axes says "
-            "otherwise, of an image --image-axes");
-        return;
-    }
-    const Mat3 frame = frameOf(options.axes);
-    affine.linear = frame * affine.linear;
-    affine.origin = frame * affine.origin;
-}
-
-namespace {
-
 bool isVdb(const std::filesystem::path& file)
 {
     return lowerCase(file.extension().string()) == ".vdb";
@@ -149,10 +72,10 @@ SourceReader readerFor(const std::filesystem::path& file)
     if (ends({".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})) {
         return readNifti;
     }
-    if (ends({".nrrd", ".nhdr"})) {
-        return readNrrd;
-    }
-    return ends({".mha", ".mhd"}) ? readMeta : ends({".mgz", ".mgh"}) ? readMgh : nullptr;
+    return ends({".nrrd", ".nhdr"}) ? readNrrd
+           : ends({".mha", ".mhd"}) ? readMeta
+           : ends({".mgz", ".mgh"}) ? readMgh
+                                    : nullptr;
 }
 
 void checkFile(const std::filesystem::path& file)
@@ -163,9 +86,8 @@ void checkFile(const std::filesystem::path& file)
     std::ifstream in(file, std::ios::binary);
     std::string start(23, '\0');
     in.read(start.data(), static_cast<std::streamsize>(start.size()));
-    if (in.gcount() == 0) {
-        refuse(file, "{}", in.is_open() ? "is empty: get the file again" : "cannot be opened: check the permissions");
-    }
+    refuseIf(in.gcount() == 0, file, "{}",
+             in.is_open() ? "is empty: get the file again" : "cannot be opened: check the permissions");
     refuseIf(start.rfind("version https://git-lfs", 0) == 0, file,
              "is a git-LFS pointer, not the data: run 'git lfs pull' where it came from");
 }
@@ -180,9 +102,7 @@ ImportedLabels labelsOf(Source source, const ImportOptions& options)
     } else {
         LabelSink sink(source.header, source.size, LabelRules(source.scaled, options));
         decode(source, options.progress, [&](std::span<const double> values) { sink.add(values); });
-        for (SegmentName& s : source.segments) {
-            out.names.push_back(std::move(s.label));
-        }
+        std::ranges::transform(source.segments, std::back_inserter(out.names), &SegmentName::label);
         sink.finish(source.label, out);
         if (!options.overlap.empty()) {
             out.warnings.emplace_back("--overlap decides nothing: a voxel of it has one label");
@@ -236,6 +156,78 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
 }
 
 }  // namespace
+
+Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_t> sizes, Source& source)
+{
+    if (sizes.size() <= 3) {
+        return checkedSize(file, sizes);
+    }
+    std::uint64_t volumes = 1;
+    for (std::size_t i = 3; i < sizes.size(); ++i) {
+        refuseIf(sizes[i] < 1 || sizes[i] > 32767 || volumes > 32767, file,
+                 "its size is {}: each side must be 1 to 32767, save it again", fmt::join(sizes, " x "));
+        volumes *= static_cast<std::uint64_t>(sizes[i]);
+    }
+    source.dimensions = fmt::format("{}", fmt::join(sizes, " x "));
+    sizes.resize(3);
+    const Index3 size = checkedSize(file, sizes);
+    source.volumes = volumes;
+    source.volumeInner = static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]);
+    return size;
+}
+
+void chooseVolume(Source& source, const ImportOptions& options)
+{
+    if (options.volume > 0 && source.layers > 1) {
+        std::swap(source.volumes, source.layers);
+        source.volumeInner = source.inner;
+        source.inner = 1;
+        std::erase_if(source.segments,
+                      [&](const SegmentName& s) { return s.layer + 1 != static_cast<std::uint64_t>(options.volume); });
+    }
+    refuseIf(static_cast<std::uint64_t>(options.volume) > source.volumes, source.header, "--volume {}: it holds {}",
+             options.volume, source.volumes == 1 ? "one volume" : fmt::format("{} volumes", source.volumes));
+    refuseIf(source.volumes > 1 && options.volume == 0, source.header,
+             "holds {} volumes, or as many values per voxel ({}): choose one with --volume N, or --image-volume N "
+             "where it is the image",
+             source.volumes, source.dimensions);
+    source.volume = source.volumes > 1 ? static_cast<std::uint64_t>(options.volume) - 1 : 0;
+}
+
+void refuseAxes(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseIf(!options.axes.empty() && !options.axesIfUnsaid, file,
+             "--axes {}: it says itself where its axes run: leave --axes out", options.axes);
+}
+
+void refuseVolume(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseIf(options.volume > 1, file, "--volume {}: it holds one volume", options.volume);
+}
+
+void placeAxes(Source& source, const ImportOptions& options)
+{
+    if (source.oriented) {
+        refuseAxes(source.header, options);
+    } else if (source.assumed && options.axes.empty()) {
+        source.affine = *source.assumed;
+    } else {
+        placeAxes(options, source.affine, source.warnings);
+    }
+}
+
+void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::string>& warnings)
+{
+    if (options.axes.empty()) {
+        warnings.emplace_back(
+            "it does not say which side is left: its axes are taken as left, posterior, superior; --axes says "
+            "otherwise, of an image --image-axes");
+        return;
+    }
+    const Mat3 frame = frameOf(options.axes);
+    affine.linear = frame * affine.linear;
+    affine.origin = frame * affine.origin;
+}
 
 bool hasSourceName(const std::filesystem::path& file)
 {

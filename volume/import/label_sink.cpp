@@ -150,16 +150,13 @@ void LabelSink::refuseOdd(bool surelyLabels) const
                "the whole number",
                fraction_->voxel, fraction_->value, fractions_, farthest_);
     }
-    if (different() > maxDifferent && !surelyLabels) {
-        refuse(file_,
-               "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
-               "an image: give the segmentation that was made of it",
-               outside_->voxel, outside_->value);
-    }
-    if (std::abs(outside_->value) > maxExact) {
-        refuse(file_, "{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones",
-               outside_->voxel, outside_->value);
-    }
+    refuseIf(different() > maxDifferent && !surelyLabels, file_,
+             "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
+             "an image: give the segmentation that was made of it",
+             outside_->voxel, outside_->value);
+    refuseIf(std::abs(outside_->value) > maxExact, file_,
+             "{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones", outside_->voxel,
+             outside_->value);
     refuse(file_,
            "{} is {:.17g}: a label is a whole number from 0 to 65535; if this is a label map, --renumber "
            "gives such labels free values; if it is an image, give the segmentation that was made of it",
@@ -212,12 +209,10 @@ void LabelSink::finish(bool surelyLabels, ImportedLabels& out)
     if (fraction_ || outside_) {
         refuseOdd(surelyLabels);
     }
-    if (different() > maxDifferent && !surelyLabels) {
-        refuse(file_,
-               "has {} different values, so it is not a label map (at most {}) but an image: give the "
-               "segmentation that was made of it",
-               different(), maxDifferent);
-    }
+    refuseIf(different() > maxDifferent && !surelyLabels, file_,
+             "has {} different values, so it is not a label map (at most {}) but an image: give the "
+             "segmentation that was made of it",
+             different(), maxDifferent);
     if (fractions_ > 0) {
         out.warnings.push_back(
             fmt::format("{} voxels are rounded to whole numbers, by up to {:.2g}", fractions_, farthest_));

@@ -1,6 +1,7 @@
 #include <volume/import/header_text.h>
 #include <volume/import/source.h>
 
+#include <algorithm>
 #include <fstream>
 
 namespace palpate::volume {
@@ -38,12 +39,8 @@ bool isTrue(const Fields& fields, const std::string& key)
 // The first of several names of the same thing that is there.
 std::string firstOf(const Fields& fields, std::initializer_list<const char*> keys)
 {
-    for (const char* key : keys) {
-        if (const auto found = fields.find(key); found != fields.end()) {
-            return found->second;
-        }
-    }
-    return "";
+    const auto there = std::ranges::find_if(keys, [&](const char* key) { return fields.contains(key); });
+    return there == keys.end() ? "" : fields.at(*there);
 }
 
 Component metaComponent(const std::filesystem::path& file, const std::string& type)
@@ -64,10 +61,8 @@ std::vector<std::int64_t> sizesOf(const std::filesystem::path& file, const Field
 {
     std::vector<std::int64_t> sizes = integers(file, "DimSize", fields.at("DimSize"));
     const std::string said = firstOf(fields, {"NDims"});
-    if (!said.empty() && integer(file, "NDims", said) != static_cast<std::int64_t>(sizes.size())) {
-        refuse(file, "NDims = {} but DimSize = {}: its header contradicts itself, save it again", said,
-               fields.at("DimSize"));
-    }
+    refuseIf(!said.empty() && integer(file, "NDims", said) != static_cast<std::int64_t>(sizes.size()), file,
+             "NDims = {} but DimSize = {}: its header contradicts itself, save it again", said, fields.at("DimSize"));
     dimensions = std::max<std::size_t>(3, sizes.size());
     while (sizes.size() > 3 && sizes.back() == 1) {
         sizes.pop_back();

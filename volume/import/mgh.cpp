@@ -43,9 +43,7 @@ Source readMgh(const std::filesystem::path& file)
     static const std::map<int, Component> types = {
         {0, Component::u8}, {1, Component::i32}, {3, Component::f32}, {4, Component::i16}, {10, Component::u16}};
     const auto type = types.find(integer(20));
-    if (type == types.end()) {
-        refuse(file, "its type of voxel, {}, is not read: save it with whole numbers", integer(20));
-    }
+    refuseIf(type == types.end(), file, "its type of voxel, {}, is not read: save it with whole numbers", integer(20));
     source.component = type->second;
     source.bigEndian = true;
     source.skip = headerBytes;

@@ -173,10 +173,8 @@ void placeNifti(const NiftiHeader& header, Source& source)
     if (hasQ) {
         // The format allows no negative edge, and readers differ in what they make of one: a mirrored axis, or none.
         for (const std::size_t k : {1, 2, 3}) {
-            if (header.pixdim(k) < 0) {
-                refuse(source.header, "pixdim[{}] = {:g}: it is not known which way this axis runs, save it again", k,
-                       header.pixdim(k));
-            }
+            refuseIf(header.pixdim(k) < 0, source.header,
+                     "pixdim[{}] = {:g}: it is not known which way this axis runs, save it again", k, header.pixdim(k));
         }
         refuseIf(!q, source.header, "the quaternion of its qform is longer than one, so it is no rotation: save it again");
         source.affine = *q;
@@ -231,12 +229,10 @@ Component componentOf(const std::filesystem::path& file, const NiftiHeader& head
              "has colours or complex numbers as voxels: save it with one number per voxel");
     const auto found = types.find(code);
     refuseIf(found == types.end(), file, "datatype {} is not read: save it with whole or floating-point numbers", code);
-    if (header.bitpix() < 0 || static_cast<std::uint64_t>(header.bitpix()) != 8 * bytesOf(found->second)) {
-        refuse(file,
-               "datatype {} has {} bits per voxel, but bitpix says {}: its header contradicts itself, save "
-               "it again",
-               code, 8 * bytesOf(found->second), header.bitpix());
-    }
+    refuseIf(header.bitpix() < 0 || static_cast<std::uint64_t>(header.bitpix()) != 8 * bytesOf(found->second), file,
+             "datatype {} has {} bits per voxel, but bitpix says {}: its header contradicts itself, save "
+             "it again",
+             code, 8 * bytesOf(found->second), header.bitpix());
     return found->second;
 }
 

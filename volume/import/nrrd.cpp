@@ -84,10 +84,9 @@ std::vector<std::string> perAxis(const NrrdHeader& header, const std::string& na
 std::vector<Axis> axesOf(const NrrdHeader& header)
 {
     const std::vector<std::int64_t> sizes = integers(header.file, "sizes", header.field("sizes"));
-    if (integer(header.file, "dimension", header.field("dimension")) != static_cast<std::int64_t>(sizes.size())) {
-        refuse(header.file, "dimension: {} but sizes: {}: its header contradicts itself, save it again",
-               header.field("dimension"), header.field("sizes"));
-    }
+    refuseIf(integer(header.file, "dimension", header.field("dimension")) != static_cast<std::int64_t>(sizes.size()),
+             header.file, "dimension: {} but sizes: {}: its header contradicts itself, save it again",
+             header.field("dimension"), header.field("sizes"));
     const auto kinds = perAxis(header, "kinds", sizes.size());
     const auto directions = perAxis(header, "space directions", sizes.size());
     const auto spacings = perAxis(header, "spacings", sizes.size());
@@ -140,10 +139,9 @@ double unitOf(const NrrdHeader& header)
     double all = 0;
     for (std::string unit; in >> unit;) {
         const auto found = known.find(unit);
-        if (found == known.end() || (all > 0 && all != found->second)) {
-            refuse(header.file, "space units: {}: only one of mm, um, cm and m for all axes is understood, save it in mm",
-                   header.field("space units").substr(0, 60));
-        }
+        refuseIf(found == known.end() || (all > 0 && all != found->second), header.file,
+                 "space units: {}: only one of mm, um, cm and m for all axes is understood, save it in mm",
+                 header.field("space units").substr(0, 60));
         all = found->second;
     }
     return all > 0 ? all : 1e-3;
@@ -176,12 +174,10 @@ void findLayers(const NrrdHeader& header, const std::vector<Axis>& axes, const s
         if (axes[i].size == 1) {
             continue;
         }
-        if (axes[i].size < 1 || axes[i].size > 32767 || source.layers > 1 || source.volumes > 1) {
-            refuse(header.file,
-                   "sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
-                   "save one volume of it",
-                   header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
-        }
+        refuseIf(axes[i].size < 1 || axes[i].size > 32767 || source.layers > 1 || source.volumes > 1, header.file,
+                 "sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
+                 "save one volume of it",
+                 header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
         source.dimensions =
             fmt::format("sizes: {}; kinds: {}", header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
         const bool list = isLayerKind(axes[i].kind) && axes[i].size <= 4096;

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 #include <set>
 
@@ -43,10 +44,8 @@ std::vector<std::size_t> winnersFirst(const std::filesystem::path& file, const s
     for (const std::string& name : overlap) {
         const auto found =
             std::find_if(order.begin(), order.end(), [&](std::size_t i) { return segments[i].label.name == name; });
-        if (found == order.end()) {
-            refuse(file, "--overlap names '{}', which is no segment of it: it has {}", name,
-                   fmt::join(namesOf(segments), ", "));
-        }
+        refuseIf(found == order.end(), file, "--overlap names '{}', which is no segment of it: it has {}", name,
+                 fmt::join(namesOf(segments), ", "));
         std::rotate(order.begin(), found, found + 1);
     }
     return order;
@@ -128,9 +127,7 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
     }
     std::stable_sort(out.overlaps.begin(), out.overlaps.end(),
                      [](const Overlap& a, const Overlap& b) { return a.voxels > b.voxels; });
-    for (const Segment& s : segments) {
-        out.names.push_back(s.label);
-    }
+    std::ranges::transform(segments, std::back_inserter(out.names), &Segment::label);
 }
 
 std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& options)

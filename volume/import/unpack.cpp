@@ -47,8 +47,7 @@ class Inflater {
 public:
     Inflater() { base::failIf(inflateInit2(&stream_, 47) != Z_OK, "zlib cannot start: out of memory"); }
     ~Inflater() { inflateEnd(&stream_); }
-    Inflater(const Inflater&) = delete;
-    Inflater& operator=(const Inflater&) = delete;
+    Inflater& operator=(Inflater&&) = delete;
 
     void take(std::span<std::byte> packed)
     {
@@ -79,8 +78,7 @@ class Bunzipper {
 public:
     Bunzipper() { start(); }
     ~Bunzipper() { BZ2_bzDecompressEnd(&stream_); }
-    Bunzipper(const Bunzipper&) = delete;
-    Bunzipper& operator=(const Bunzipper&) = delete;
+    Bunzipper& operator=(Bunzipper&&) = delete;
 
     void take(std::span<std::byte> packed)
     {

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -38,28 +39,11 @@ void appendAs(std::span<const std::byte> bytes, bool turned, std::vector<double>
 
 void append(Component component, std::span<const std::byte> bytes, bool turned, std::vector<double>& out)
 {
-    switch (component) {
-        case Component::u8:
-            return appendAs<std::uint8_t>(bytes, turned, out);
-        case Component::i8:
-            return appendAs<std::int8_t>(bytes, turned, out);
-        case Component::u16:
-            return appendAs<std::uint16_t>(bytes, turned, out);
-        case Component::i16:
-            return appendAs<std::int16_t>(bytes, turned, out);
-        case Component::u32:
-            return appendAs<std::uint32_t>(bytes, turned, out);
-        case Component::i32:
-            return appendAs<std::int32_t>(bytes, turned, out);
-        case Component::u64:
-            return appendAs<std::uint64_t>(bytes, turned, out);
-        case Component::i64:
-            return appendAs<std::int64_t>(bytes, turned, out);
-        case Component::f32:
-            return appendAs<float>(bytes, turned, out);
-        case Component::f64:
-            return appendAs<double>(bytes, turned, out);
-    }
+    constexpr std::array all{appendAs<std::uint8_t>,  appendAs<std::int8_t>,   appendAs<std::uint16_t>,
+                             appendAs<std::int16_t>,  appendAs<std::uint32_t>, appendAs<std::int32_t>,
+                             appendAs<std::uint64_t>, appendAs<std::int64_t>,  appendAs<float>,
+                             appendAs<double>};  // by Component
+    all[static_cast<std::size_t>(component)](bytes, turned, out);
 }
 
 }  // namespace

@@ -102,10 +102,9 @@ std::string offers(const volume::ImportedLabels& labels, const LabelCounts& coun
     std::ranges::stable_sort(fitting, {}, [](const LabelMap* map) { return map->labels.size(); });
     std::vector<std::string> list;
     for (std::size_t i = 0; i < std::min(fitting.size(), maxOffers); ++i) {
-        std::vector<std::string> parts;
-        for (const auto& [voxels, value] : largest) {
-            parts.push_back(fmt::format("{} is {}", value, find(fitting[i]->labels, value)->name));
-        }
+        const auto parts = base::mapped<std::string>(largest, [&](const auto& one) {
+            return fmt::format("{} is {}", one.second, find(fitting[i]->labels, one.second)->name);
+        });
         list.push_back(fmt::format("--map {} ({})", fitting[i]->name, fmt::join(parts, ", ")));
     }
     const std::string more =

@@ -19,19 +19,12 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uintmax_t largestFile = 16U << 20U;
 constexpr std::size_t maxRowsListed = 8;   // labels in a message
 constexpr std::size_t longestLine = 1000;  // std::regex needs a frame of the stack for each character
 
 std::string textOf(const std::filesystem::path& file)
 {
-    if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        throw base::error("{}: {}", file.native(), why);
-    }
-    std::error_code error;
-    if (const auto size = std::filesystem::file_size(file, error); error || size > largestFile) {
-        throw base::error("{}: over 16 MB, too large for a table of names: is it a volume?", file.native());
-    }
+    base::checkTable(file, "a table of names");
     std::ifstream in(file, std::ios::binary);
     std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     base::failIf(in.bad() || !in.is_open(), "{}: cannot be read: check its permissions", file.native());

@@ -1,6 +1,7 @@
 #include <volume/prepare/steps.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 #include <base/mapped.h>
 #include <base/split.h>
 #include <volume/clean.h>
@@ -188,9 +189,7 @@ private:
             }
         }
         const Index3 low = glm::max(box->first, Index3(0)), high = glm::min(box->second, image_.size - 1);
-        if (glm::any(glm::lessThan(high, low))) {
-            throw base::error("--crop {}: no voxel lies there; {}", options_.crop, extentText());
-        }
+        base::failIf(glm::any(glm::lessThan(high, low)), "--crop {}: no voxel lies there; {}", options_.crop, extentText());
         const std::size_t before = image_.values.size();
         image_ = volume::cropped(image_, low, high);
         const Index3 n = image_.size;
@@ -268,10 +267,7 @@ private:
             names_.push_back({labels.skin, "skin", skinTissue()});
         }
         const auto taken = volume::addSkin(image_, labels, options_.addSkin);
-        std::uint64_t all = 0;
-        for (const volume::Relabelled& r : taken) {
-            all += r.voxels;
-        }
+        const auto all = base::sumOf(taken, &volume::Relabelled::voxels, std::uint64_t{0});
         report("add-skin", "skin", all, fmt::format("{} became {:g} mm of skin", amount(all), 1e3 * options_.addSkin));
         reportTaken("add-skin", taken);
     }
@@ -300,10 +296,9 @@ private:
 
     std::string skinTissue() const
     {
-        for (const volume::TissueRow& row : table_.rows) {
-            if (row.role == Role::skin) {
-                return row.name;
-            }
+        if (const auto skin = std::ranges::find(table_.rows, Role::skin, &volume::TissueRow::role);
+            skin != table_.rows.end()) {
+            return skin->name;
         }
         throw base::error("--add-skin: the tissue table '{}' has no tissue of role skin: add one to it", table_.name);
     }

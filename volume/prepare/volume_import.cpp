@@ -134,12 +134,8 @@ volume::Provenance provenanceOf(const ImportRequest& o, const volume::LabelImage
 void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vector<std::string>& notes)
 {
     const auto nameOf = [&](std::uint16_t value) {
-        for (const volume::LabelName& n : labels.names) {
-            if (n.value == value) {
-                return n.name;
-            }
-        }
-        return fmt::format("label {}", value);
+        const auto n = std::ranges::find(labels.names, value, &volume::LabelName::value);
+        return n == labels.names.end() ? fmt::format("label {}", value) : n->name;
     };
     std::uint64_t all = 0;
     const volume::Overlap* most = nullptr;
@@ -163,6 +159,15 @@ void checkLength(const LengthBounds& bounds, double length)
 {
     if (length != 0.0) {
         base::lengthWithin(bounds.option, fmt::format("{:g}mm", 1e3 * length), length, bounds.least, bounds.most);
+    }
+}
+
+void checkBody(const ImportRequest& request, const volume::LabelImage& image)
+{
+    try {
+        volume::checkImage(image);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(request.input.string() + ": " + e.what());
     }
 }
 
@@ -200,19 +205,6 @@ NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
     return read;
 }
 
-namespace {
-
-void checkBody(const ImportRequest& request, const volume::LabelImage& image)
-{
-    try {
-        volume::checkImage(image);
-    } catch (const std::runtime_error& e) {
-        throw std::runtime_error(request.input.string() + ": " + e.what());
-    }
-}
-
-}  // namespace
-
 ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTable& table, const ImportProgress& tell)
 {
     checkRequest(request);
@@ -220,10 +212,7 @@ ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTa
     std::vector<std::string> notes = labels.warnings;
     noteOverlaps(labels, request.mapping.verbose, notes);
     std::vector<volume::LabelName> named = mapLabels(request.mapping, request.input, labels, counts, table, notes);
-    std::optional<volume::ImportedImage> image;
-    if (!request.image.empty()) {
-        image = readImage(request, notes, tell);
-    }
+    auto image = request.image.empty() ? std::nullopt : std::optional(readImage(request, notes, tell));
     auto steps = addBody(request, labels.image, named, table, image ? &*image : nullptr, notes, tell);
     for (auto& step :
          prepare(labels.image, named, table, request.steps, [&](const std::string& what) { tell(what, {}); })) {

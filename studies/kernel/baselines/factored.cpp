@@ -1,6 +1,7 @@
 #include <studies/kernel/baselines/factored.h>
 
 #include <base/error.h>
+#include <base/folds.h>
 
 #include <Eigen/Dense>
 #include <Eigen/SparseCholesky>
@@ -29,6 +30,20 @@ void addBlock(const Mat3& block, std::uint32_t p, std::uint32_t q, std::vector<E
             }
         }
     }
+}
+
+constexpr double reach = 0.3;      // of points beside the sphere's way, in radii
+constexpr double settled = 1e-10;  // no contact is further off the sphere [m]
+constexpr std::size_t maxSteps = 100;
+constexpr std::size_t together = 48;  // columns solved at once
+constexpr std::size_t chunk = 2048;   // unknowns whose sums stay in the first cache
+
+double distanceToSegment(Vec3 p, Vec3 a, Vec3 b)
+{
+    const Vec3 way = b - a;
+    const double length = glm::dot(way, way);
+    const double t = length > 0.0 ? std::clamp(glm::dot(p - a, way) / length, 0.0, 1.0) : 0.0;
+    return glm::distance(p, a + t * way);
 }
 
 }  // namespace
@@ -62,24 +77,6 @@ void TetFactor::solve(std::span<double> columns) const
     Eigen::Map<Eigen::MatrixXd> all(columns.data(), rows, static_cast<Eigen::Index>(columns.size()) / rows);
     all = impl_->factors.solve(all).eval();
 }
-
-namespace {
-
-constexpr double reach = 0.3;      // of points beside the sphere's way, in radii
-constexpr double settled = 1e-10;  // no contact is further off the sphere [m]
-constexpr std::size_t maxSteps = 100;
-constexpr std::size_t together = 48;  // columns solved at once
-constexpr std::size_t chunk = 2048;   // unknowns whose sums stay in the first cache
-
-double distanceToSegment(Vec3 p, Vec3 a, Vec3 b)
-{
-    const Vec3 way = b - a;
-    const double length = glm::dot(way, way);
-    const double t = length > 0.0 ? std::clamp(glm::dot(p - a, way) / length, 0.0, 1.0) : 0.0;
-    return glm::distance(p, a + t * way);
-}
-
-}  // namespace
 
 FactoredTets::FactoredTets(TetBody mesh, const TrialPath& path) : mesh_(std::move(mesh))
 {
@@ -262,11 +259,7 @@ Vec3 FactoredTets::displacement(Vec3 rest) const
 
 Vec3 FactoredTets::force() const
 {
-    Vec3 sum(0.0);
-    for (const Contact& c : contacts_) {
-        sum -= c.force;
-    }
-    return sum;
+    return -base::sumOf(contacts_, &Contact::force, Vec3(0.0));
 }
 
 TrialModel factoredModel(TetBody mesh, const TrialPath& path)

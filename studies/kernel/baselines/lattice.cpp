@@ -33,45 +33,6 @@ void move(FifoScratch& scratch, std::span<Vec3f> u, Node n, Vec3f to)
     }
 }
 
-}  // namespace
-
-FifoScratch::FifoScratch(const Lattice& lattice)
-    : seen(lattice.tissue.size(), 0), held(lattice.tissue.size(), 0), waits(lattice.tissue.size(), 0)
-{
-}
-
-std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratch& scratch, std::span<const Seed> seeds)
-{
-    ++scratch.pass;
-    scratch.queue.clear();
-    scratch.moved.clear();
-    for (const Seed& seed : seeds) {
-        scratch.held[seed.node] = scratch.pass;
-        move(scratch, u, seed.node, seed.u);
-    }
-    const float least = rounding * static_cast<float>(lattice.grid.spacing);
-    const std::size_t most = movesPerNode * lattice.tissue.size();
-    std::size_t moves = 0;
-    for (std::size_t head = 0; head < scratch.queue.size(); ++head) {
-        const Node a = scratch.queue[head];
-        scratch.waits[a] = 0;
-        for (int side = 0; side < 6 && moves < most; ++side) {
-            const Node b = lattice.beside(a, side);
-            if (!lattice.isNode(b) || lattice.isFixed(b) || scratch.held[b] == scratch.pass) {
-                continue;
-            }
-            const Vec3f step = correction(u[b] - u[a], side, lattice.between(a, b));
-            if (glm::dot(step, step) > least * least) {
-                move(scratch, u, b, u[b] + step);
-                ++moves;
-            }
-        }
-    }
-    return moves;
-}
-
-namespace {
-
 // Spacing [m], and the fraction of the table's limits that erred least over presses and drags of a 10 mm sphere in the
 // scenes `block` and `layered`, among those that cost under a millisecond at 2 mm: the work grows with the share's inverse
 // cube.
@@ -136,6 +97,41 @@ struct FifoMail {
 };
 
 }  // namespace
+
+FifoScratch::FifoScratch(const Lattice& lattice)
+    : seen(lattice.tissue.size(), 0), held(lattice.tissue.size(), 0), waits(lattice.tissue.size(), 0)
+{
+}
+
+std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratch& scratch, std::span<const Seed> seeds)
+{
+    ++scratch.pass;
+    scratch.queue.clear();
+    scratch.moved.clear();
+    for (const Seed& seed : seeds) {
+        scratch.held[seed.node] = scratch.pass;
+        move(scratch, u, seed.node, seed.u);
+    }
+    const float least = rounding * static_cast<float>(lattice.grid.spacing);
+    const std::size_t most = movesPerNode * lattice.tissue.size();
+    std::size_t moves = 0;
+    for (std::size_t head = 0; head < scratch.queue.size(); ++head) {
+        const Node a = scratch.queue[head];
+        scratch.waits[a] = 0;
+        for (int side = 0; side < 6 && moves < most; ++side) {
+            const Node b = lattice.beside(a, side);
+            if (!lattice.isNode(b) || lattice.isFixed(b) || scratch.held[b] == scratch.pass) {
+                continue;
+            }
+            const Vec3f step = correction(u[b] - u[a], side, lattice.between(a, b));
+            if (glm::dot(step, step) > least * least) {
+                move(scratch, u, b, u[b] + step);
+                ++moves;
+            }
+        }
+    }
+    return moves;
+}
 
 TrialModel fifoMailModel(const BaselineScene& scene, double spacing, double fraction)
 {

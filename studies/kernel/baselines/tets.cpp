@@ -287,10 +287,8 @@ TetBody latticeTets(const volume::Tissue& tissue, const volume::DistanceField& s
                     std::size_t maxPoints)
 {
     const auto cells = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
-    if (cells.count() / 2 > maxPoints) {
-        throw base::error("{} cells of {:g} mm: too many for {} points; take a larger spacing", cells.count(),
-                          1e3 * spacing, maxPoints);
-    }
+    base::failIf(cells.count() / 2 > maxPoints, "{} cells of {:g} mm: too many for {} points; take a larger spacing",
+                 cells.count(), 1e3 * spacing, maxPoints);
     TetBody mesh = Cutter(tissue, cells, poissonCap).cut(surface);
     base::failIf(mesh.tets.empty(), "no cell of {:g} mm is half full of tissue and held; take a smaller spacing",
                  1e3 * spacing);

@@ -4,8 +4,10 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <utility>
 
@@ -188,11 +190,9 @@ chainmail::ElasticResult Xpbd::step(Vec3 centre, double radius)
         touches_[p] = 0;
     }
     near_.clear();
-    for (const std::uint32_t p : outer_) {
-        if (radius > 0.0 && glm::distance(mesh_.points[p] + Vec3(u_[p]), centre) < radius + reach) {
-            near_.push_back(p);
-        }
-    }
+    std::ranges::copy_if(outer_, std::back_inserter(near_), [&](std::uint32_t p) {
+        return radius > 0.0 && glm::distance(mesh_.points[p] + Vec3(u_[p]), centre) < radius + reach;
+    });
     force_ = Vec3(0.0);
     touched_ = 0;
     const float keep = 1.0F / (1.0F + static_cast<float>(options_.damping) * substep_);
