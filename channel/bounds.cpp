@@ -70,12 +70,6 @@ bool soundOfUltrasound(const Scenery& s) noexcept
            std::ranges::all_of(s.sound, [](const TissueSound& t) { return sound(t); });
 }
 
-bool soundOfCt(const Scenery& s) noexcept
-{
-    return s.ctSlices <= maxSlices && within(s.ctWidth, 0, 1) && within(s.ctDoseIndex, 0, 1e4) &&
-           within(s.ctDoseLength, 0, 1e6);
-}
-
 // Its axes are unit vectors at right angles.
 bool sound(const ProbePose& p) noexcept
 {
@@ -126,7 +120,8 @@ bool sound(const Scenery& s) noexcept
             return false;
     return s.toolRadius >= 0 && s.toolRadius <= 1 && s.toolLength >= 0 && s.toolLength <= 10 && upTo(s.entry, furthest) &&
            upTo(s.aim, furthest) && upTo(s.forceCap, strongest) && upTo(s.imageLow, largestValue) &&
-           upTo(s.imageStep, largestValue) && soundOfUltrasound(s) && soundOfCt(s);
+           upTo(s.imageStep, largestValue) && soundOfUltrasound(s) && s.ctSlices <= maxSlices && within(s.ctWidth, 0, 1) &&
+           within(s.ctDoseIndex, 0, 1e4) && within(s.ctDoseLength, 0, 1e6);
 }
 
 bool sound(const State& s, const Scenery& scenery) noexcept

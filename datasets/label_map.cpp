@@ -70,7 +70,9 @@ std::vector<LabelMap> readBuiltIn()
         const std::string file = "built-in " + name + ".toml";
         const toml::table root = parseToml(embeddedFile("tables/" + name + ".toml"), file);
         Section top(root, file, "");
-        maps = base::mapped<LabelMap>(top.sections("map"), [&](Section& section) { return readMap(section, name); });
+        for (Section& section : top.sections("map")) {
+            maps.push_back(readMap(section, name));
+        }
         top.finish();
     }
     return maps;

@@ -42,12 +42,6 @@ double placeOf(const SmoothLabels& labels, int side)
     return labels.low[side / 2] - 0.5 + (side % 2 == 0 ? 0 : labels.size[side / 2]);
 }
 
-bool liesOnHeldSide(const SmoothLabels& labels, Vec3 p)
-{
-    const int side = labels.heldSide;
-    return side >= 0 && std::abs(labels.affine.toIndex(p)[side / 2] - placeOf(labels, side)) < onSide;
-}
-
 }  // namespace
 
 std::vector<SortedFace> sortedFaces(const TetMesh& mesh)
@@ -184,7 +178,10 @@ void addFaces(const volume::Tissue& tissue, const SmoothLabels& labels, TetMesh&
         }
         const Vec3 centre = (p[0] + p[1] + p[2]) / 3.0;
         const Vec3 normal = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
-        face.held = liesOnHeldSide(labels, centre) || looksAtHeld(tissue, reader, centre, voxel * normal);
+        const int side = labels.heldSide;
+        const bool onHeldSide =
+            side >= 0 && std::abs(labels.affine.toIndex(centre)[side / 2] - placeOf(labels, side)) < onSide;
+        face.held = onHeldSide || looksAtHeld(tissue, reader, centre, voxel * normal);
         mesh.faces.push_back(face);
     }
 }

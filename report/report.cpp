@@ -108,8 +108,11 @@ std::vector<bool> shownAtFirst(const ReportData& d, std::size_t structures)
 {
     std::vector<std::pair<double, std::size_t>> nearest;
     for (std::size_t i = 1; i < structures; ++i) {
-        const auto& distances = d.distances[2 + i];
-        nearest.emplace_back(distances.empty() ? std::numeric_limits<double>::infinity() : std::ranges::min(distances), i);
+        double least = std::numeric_limits<double>::infinity();
+        for (const double v : d.distances[2 + i]) {
+            least = v < least ? v : least;
+        }
+        nearest.emplace_back(least, i);
     }
     std::ranges::sort(nearest);
     std::vector<bool> shown(structures, false);

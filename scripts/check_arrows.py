@@ -90,11 +90,7 @@ def faults(root):
                     yield f"{name}:{number}: {included} belongs in {', '.join(sorted(owners))}/ only"
 
 
-def main():
-    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")
-    found = list(faults(root))
-    print("\n".join(found) if found else "the arrows between folders hold")
-    return 1 if found else 0
-
-
-sys.exit(main())
+root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+found = list(faults(root))
+print("\n".join(found) if found else "the arrows between folders hold")
+sys.exit(1 if found else 0)

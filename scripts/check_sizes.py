@@ -68,10 +68,6 @@ def faults(root):
                 yield f"{name}:{first}: loops and branches {deepest} deep: at most {DEEPEST}"
 
 
-def main():
-    found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
-    print("\n".join(found) if found else "files and functions are short enough")
-    return 1 if found else 0
-
-
-sys.exit(main())
+found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
+print("\n".join(found) if found else "files and functions are short enough")
+sys.exit(1 if found else 0)

@@ -68,10 +68,6 @@ def faults(root):
         yield from measure_faults(root, "docs/score.md")
 
 
-def main():
-    found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
-    print("\n".join(found) if found else "the documents' tables hold")
-    return 1 if found else 0
-
-
-sys.exit(main())
+found = list(faults(pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")))
+print("\n".join(found) if found else "the documents' tables hold")
+sys.exit(1 if found else 0)

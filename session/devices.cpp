@@ -95,17 +95,15 @@ std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceReques
     return std::make_unique<WithViewer>(std::move(device), *broadcast);
 }
 
-std::unique_ptr<Device> openRecord(const SessionModel&, const DeviceRequest& request, const Broadcast*)
-{
-    return std::make_unique<haptics::ReplayDevice>(haptics::Record(request.name));
-}
-
 // A new device is a line here. The last stands for all other names.
 constexpr std::array kinds{
     DeviceKind{"hand", "hand (a scripted trainee)", "", false, false, openHand},
     DeviceKind{"mouse", "mouse (in the viewer's window)", "", true, true, openMouse},
     DeviceKind{"falcon", "falcon (Novint Falcon)", "falcon", true, false, openFalcon},
-    DeviceKind{"", "a record (.db) to play back", "", false, false, openRecord},
+    DeviceKind{"", "a record (.db) to play back", "", false, false,
+               [](const SessionModel&, const DeviceRequest& request, const Broadcast*) -> std::unique_ptr<Device> {
+                   return std::make_unique<haptics::ReplayDevice>(haptics::Record(request.name));
+               }},
 };
 
 void checkTool(const DeviceRequest& request, const datasets::Scene& scene)

@@ -45,12 +45,6 @@ struct Answer {
     std::string text;  // standard output and error
 };
 
-// A name in which sbatch replaces nothing.
-std::string literally(const std::string& name)
-{
-    return fmt::format("{}", fmt::join(base::splitAt('%', name), "%%"));
-}
-
 Answer ask(const std::vector<std::string>& words)
 {
     std::string line;
@@ -163,7 +157,9 @@ private:
         option("--job-name=palpate-sweep");
         option(fmt::format("--array=0-{}", tasks - 1));
         option("--ntasks=1");
-        option(fmt::format("--output=\"{}\"", literally((folder_.path() / "slurm").string()) + "/%A_%a.log"));
+        // In the folder's name sbatch replaces nothing.
+        const std::string logs = (folder_.path() / "slurm").string();
+        option(fmt::format("--output=\"{}/%A_%a.log\"", fmt::join(base::splitAt('%', logs), "%%")));
         for (const auto& [name, value] : {std::pair<const char*, const std::string&>{"partition", settings_.partition},
                                           {"time", settings_.time},
                                           {"account", settings_.account},

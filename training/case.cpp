@@ -64,12 +64,6 @@ bool isPng(const fs::path& file)
     return in && head == "\x89PNG\r\n\x1a\n";
 }
 
-const char* taskInWords(datasets::SessionTask task)
-{
-    constexpr std::array words{"biopsy", "palpation", "touch of the skin", "way in without a core"};
-    return words[static_cast<std::size_t>(task)];
-}
-
 // A volume alone has the standard biopsy on it.
 datasets::Scene sceneOf(const Case& made)
 {
@@ -89,7 +83,8 @@ std::string lackOf(const datasets::Scene& scene, const std::string& key)
     if ((ofMarks && scene.task != Task::find) || (ofCores && scene.task != Task::biopsy) ||
         (listed == Listed::ifTouch && scene.task != Task::touch) ||
         (listed == Listed::ifAdvance && scene.task != Task::advance)) {
-        return taskInWords(scene.task);
+        constexpr std::array tasks{"biopsy", "palpation", "touch of the skin", "way in without a core"};
+        return tasks[static_cast<std::size_t>(scene.task)];
     }
     if (listed == Listed::ifProbe && scene.probe.kind == datasets::ProbeKind::none) {
         return "scene without [probe]";

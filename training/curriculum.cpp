@@ -122,7 +122,9 @@ Curriculum loadCurriculum(const fs::path& file)
     if (auto section = top.section("cusum")) {
         c.cusum = readCusum(*section);
     }
-    c.exercises = base::mapped<Exercise>(top.sections("exercise"), [&](Section& one) { return readExercise(one, c); });
+    for (Section& section : top.sections("exercise")) {
+        c.exercises.push_back(readExercise(section, c));
+    }
     top.missingIf(c.exercises.empty(), "exercise", "at least one [[exercise]]");
     top.finish();
     return c;

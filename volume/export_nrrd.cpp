@@ -8,11 +8,6 @@ namespace palpate::volume {
 
 namespace {
 
-std::string_view metaType(Component component)
-{
-    return component == Component::u8 ? "MET_UCHAR" : component == Component::u16 ? "MET_USHORT" : "MET_FLOAT";
-}
-
 std::string textOf(Vec3 v)
 {
     return fmt::format("{:.17g} {:.17g} {:.17g}", v.x, v.y, v.z);
@@ -30,11 +25,6 @@ bool isDataOf(const std::filesystem::path& header, const std::filesystem::path& 
         }
     }
     return false;
-}
-
-std::string_view nrrdType(Component component)
-{
-    return component == Component::u8 ? "unsigned char" : component == Component::u16 ? "unsigned short" : "float";
 }
 
 std::string vectorText(Vec3 v)
@@ -94,7 +84,11 @@ void writeMeta(const std::filesystem::path& file, const VoxelStream& voxels, con
     header += fmt::format("ElementSpacing = {}\nDimSize = {} {} {}\n", textOf(1e3 * spacing), grid.size.x, grid.size.y,
                           grid.size.z);
     header += voxels.components > 1 ? fmt::format("ElementNumberOfChannels = {}\n", voxels.components) : "";
-    header += fmt::format("ElementType = {}\nElementDataFile = {}\n", metaType(voxels.component),
+    const auto c = voxels.component;
+    header += fmt::format("ElementType = {}\nElementDataFile = {}\n",
+                          c == Component::u8    ? "MET_UCHAR"
+                          : c == Component::u16 ? "MET_USHORT"
+                                                : "MET_FLOAT",
                           apart ? raw.filename().string() : "LOCAL");
     if (apart) {
         refuseIf(std::filesystem::exists(raw) && !isDataOf(file, raw), raw,
@@ -118,7 +112,11 @@ void writeNrrd(const std::filesystem::path& file, const VoxelStream& voxels, std
     const bool vectors = voxels.components > 1;
     const Mat3& m = grid.affine.linear;
     std::string header = "NRRD0004\n# http://teem.sourceforge.net/nrrd/format.html\n";
-    header += fmt::format("type: {}\ndimension: {}\nspace: left-posterior-superior\n", nrrdType(voxels.component),
+    const auto c = voxels.component;
+    header += fmt::format("type: {}\ndimension: {}\nspace: left-posterior-superior\n",
+                          c == Component::u8    ? "unsigned char"
+                          : c == Component::u16 ? "unsigned short"
+                                                : "float",
                           vectors ? 4 : 3);
     header += fmt::format("sizes: {}{} {} {}\n", vectors ? fmt::format("{} ", voxels.components) : "", grid.size.x,
                           grid.size.y, grid.size.z);

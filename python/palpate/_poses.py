@@ -1,5 +1,7 @@
 """Paths of a tool."""
 
+from __future__ import annotations
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

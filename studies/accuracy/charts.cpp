@@ -31,12 +31,6 @@ constexpr std::array<std::pair<const char*, const char*>, 11> shownNames{
      {"bullet", "Bullet, neo-Hookean"},
      {"calculix", "CalculiX, neo-Hookean"}}};
 
-std::string shownName(const std::string& method)
-{
-    const auto* const found = std::ranges::find_if(shownNames, [&](const auto& name) { return method == name.first; });
-    return found != shownNames.end() ? found->second : method;
-}
-
 // What a chart shows: one scene against one law, all looks or a part of them.
 struct View {
     std::string scene, law;
@@ -75,7 +69,9 @@ bool shown(const json& entry, const View& view)
 
 void addPoint(report::Chart& chart, const json& entry, const View& view)
 {
-    const std::string method = entry.at("method"), name = shownName(method);
+    const std::string method = entry.at("method");
+    const auto* const shown = std::ranges::find_if(shownNames, [&](const auto& name) { return method == name.first; });
+    const std::string name = shown != shownNames.end() ? shown->second : method;
     auto series = std::ranges::find(chart.series, name, &report::ChartSeries::name);
     if (series == chart.series.end()) {
         series = chart.series.insert(chart.series.end(), report::ChartSeries{});

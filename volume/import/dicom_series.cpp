@@ -1,4 +1,3 @@
-#include <base/mapped.h>
 #include <volume/import/dicom_file.h>
 
 #include <glm/geometric.hpp>
@@ -149,7 +148,9 @@ void readPixels(const std::vector<Slice>& slices, const std::function<void(doubl
         if (i == 0) {
             values.reserve(slices.size() * stored.size());
         }
-        values = base::mapped<float>(stored, [&](std::int32_t v) { return frame.slope * v + frame.intercept; });
+        for (const std::int32_t v : stored) {
+            values.push_back(static_cast<float>(frame.slope * v + frame.intercept));
+        }
         if (progress) {
             progress(static_cast<double>(i + 1) / static_cast<double>(slices.size()));
         }
