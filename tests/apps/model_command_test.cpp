@@ -14,8 +14,8 @@ std::string smallScene(const Folder& folder)
     const std::string file = folder / "small.toml";
     writeText(
         file,
-        "[volume]\nphantom = \"block\"\n[volume.parameters]\nwidth_mm = 30\nthickness_mm = 16\ntumours = 0\n[tool]\nkind "
-        "= \"sphere\"\nradius_mm = 5\n[dffb]\nmode = \"off\"\n[target]\nstructure = \"base\"\naim_mm = [0, 16, "
+        "[volume]\nphantom = \"block\"\n[volume.parameters]\nwidth_mm = 20\nthickness_mm = 12\ntumours = 0\n[tool]\nkind "
+        "= \"sphere\"\nradius_mm = 5\n[dffb]\nmode = \"off\"\n[target]\nstructure = \"base\"\naim_mm = [0, 12, "
         "0]\nentry_mm = [0, 0, 0]\n");
     return file;
 }
@@ -63,11 +63,24 @@ TEST(BenchKernel, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"bench", "kernel", "-o", folder / "file"}, "is no folder");
 }
 
+// A plan of that scene, once for all tests: what is printed and what --json has.
+struct Planned {
+    static const Planned& once()
+    {
+        static const Planned plan;
+        return plan;
+    }
+
+    const Folder folder;
+    const std::string scene = smallScene(folder), json = folder / "plan.json";
+    const Outcome told = palpate({"plan", scene, "--error", "0.05", "--budget", "1ms", "--speed", "50", "--json", json});
+};
+
 TEST(Plan, PicksAModelAndSaysWhy)
 {
-    const Folder folder;
-    const std::string scene = smallScene(folder);
-    const auto plan = figures({"plan", scene, "--error", "5%", "--budget", "1ms", "--speed", "50"});
+    const Outcome& told = Planned::once().told;
+    ASSERT_EQ(told.status, 0) << told.err;
+    const auto plan = nlohmann::json::parse(readText(Planned::once().json));
     EXPECT_EQ(plan["level"], "elastic");
     EXPECT_GT(plan["spacing_mm"].get<double>(), 0.0);
     EXPECT_EQ(plan["windows"].size(), 1U);
@@ -77,9 +90,6 @@ TEST(Plan, PicksAModelAndSaysWhy)
     EXPECT_DOUBLE_EQ(plan["error_pct"].get<double>(), 5.0);
     EXPECT_DOUBLE_EQ(plan["budget_us"].get<double>(), 1000.0);
     EXPECT_GT(plan["candidates"].size(), 10U);
-
-    const Outcome told = palpate({"plan", scene, "--error", "0.05", "--budget", "1000us", "--speed", "50"});
-    EXPECT_EQ(told.status, 0);
     EXPECT_NE(told.out.find("chosen"), std::string::npos);
     EXPECT_NE(told.out.find("over the error"), std::string::npos);
     EXPECT_NE(told.out.find("gives up"), std::string::npos);
@@ -89,10 +99,10 @@ TEST(Plan, PicksAModelAndSaysWhy)
 TEST(Plan, ItsLinesMakeAScene)
 {
     const Folder folder;
-    const std::string scene = smallScene(folder);
-    const Outcome told = palpate({"plan", scene, "--error", "5%", "--budget", "1ms", "--speed", "50"});
+    const Outcome& told = Planned::once().told;
     const std::size_t begin = told.out.find("\n[model]\n");
     ASSERT_NE(begin, std::string::npos) << told.out << told.err;
+    const std::string scene = smallScene(folder);
     writeText(scene, readText(scene) + told.out.substr(begin));
     const auto trained = figures({"train", scene, "--headless", "--unpaced", "--seconds", "0.02"});
     EXPECT_EQ(trained.at("model"), "elastic");
@@ -111,6 +121,8 @@ TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
     writeText(costs, R"({"small": )" + law + R"(, "finite": )" + law + "}");
     slow.insert(slow.end(), {"--costs", costs});
     const auto there = figures(slow);
+    EXPECT_DOUBLE_EQ(here["error_pct"].get<double>(), 80.0);
+    EXPECT_DOUBLE_EQ(here["budget_us"].get<double>(), 100.0);
     EXPECT_EQ(here["level"], "spring");
     EXPECT_EQ(there["costs"], costs);
     for (std::size_t i = 0; i < here["candidates"].size(); ++i) {

@@ -139,6 +139,49 @@ nlohmann::json figures(std::vector<std::string> arguments)
     return nlohmann::json::parse(readText(folder / "figures.json"));
 }
 
+const std::string& smallLayered()
+{
+    static const Folder folder;
+    static const std::string file = [] {
+        const std::string to = folder / "layered.toml";
+        writeText(to, R"(name = "layered"
+[volume]
+phantom = "layered"
+voxel_mm = 2.0
+[volume.parameters]
+width_mm = 40
+skin_mm = 2
+fat_mm = 15
+gland_mm = 25
+muscle_mm = 10
+bone_mm = 6
+tumour_diameter_mm = 12
+tumour_depth_mm = 20
+[dffb]
+mode = "thesis"
+[dffb.surgery]
+force_n = 0.5
+mass_kg = 0.05
+damping_ns_m = 1.0
+stiffness_n_m = 100
+[dffb.structure]
+force_n = 0.6
+mass_kg = 0.05
+damping_ns_m = 1.0
+stiffness_n_m = 100
+[dffb.tissue]
+force_n = 0.4
+[[vital]]
+name = "bone"
+warn_mm = 5
+[target]
+structure = "tumour"
+)");
+        return to;
+    }();
+    return file;
+}
+
 void expectRefusal(const std::vector<std::string>& arguments, const std::string& hint)
 {
     std::string line = "palpate";

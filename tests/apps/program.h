@@ -51,6 +51,10 @@ Outcome palpate(const std::vector<std::string>& arguments);
 /// As palpate(); it has to succeed. Returns the figures of --json, which this adds.
 nlohmann::json figures(std::vector<std::string> arguments);
 
+/// A scene: the built-in layered one on a body of 40 instead of 80 mm and in voxels of 2 mm. A session in it is the same,
+/// and begins in a quarter of the time.
+const std::string& smallLayered();
+
 /// Checks that `palpate ARGUMENTS` fails with one line that names the program and holds `hint`.
 void expectRefusal(const std::vector<std::string>& arguments, const std::string& hint);
 

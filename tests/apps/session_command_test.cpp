@@ -9,8 +9,10 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <random>
 #include <thread>
 
@@ -20,11 +22,16 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::uint64_t maxLost = 500;  // ticks that a kill may cost: 0.5 s
-const std::vector<std::string> scripted{"train", "layered", "--unpaced", "--headless"};
 
 std::vector<std::string> operator+(std::vector<std::string> words, const std::vector<std::string>& more)
 {
     words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+const std::vector<std::string>& scripted()
+{
+    static const std::vector<std::string> words{"train", smallLayered(), "--unpaced", "--headless"};
     return words;
 }
 
@@ -61,11 +68,22 @@ void expectKeys(const nlohmann::json& j, const std::vector<std::string>& pointer
     }
 }
 
-TEST(Session, AReplayGivesTheSameBits)
-{
+// A scripted session without a clock, once for all tests: its record and its figures.
+struct Recorded {
+    static const Recorded& once()
+    {
+        static const Recorded session;
+        return session;
+    }
+
     const Folder folder;
     const std::string record = folder / "session.db";
-    const auto trained = figures(scripted + std::vector<std::string>{"--record", record});
+    const nlohmann::json figures = apps::figures(scripted() + std::vector<std::string>{"--record", record});
+};
+
+TEST(Session, AReplayGivesTheSameBits)
+{
+    const auto& [folder, record, trained] = Recorded::once();
     const auto replayed = figures({"replay", record});
     EXPECT_EQ(replayed.at("identical"), true);
     EXPECT_TRUE(replayed.at("first_difference_tick").is_null());
@@ -80,7 +98,7 @@ TEST(Session, ForcesDependOnTheClockOnlyThroughWhatTheRecordSays)
 {
     const Folder folder;
     const std::string record = folder / "session.db";
-    const std::vector<std::string> half{"train", "layered", "--headless", "--setting", "default", "--seconds", "1.5"};
+    const std::vector<std::string> half{"train", smallLayered(), "--headless", "--setting", "default", "--seconds", "1.5"};
     const auto paced = figures(half + std::vector<std::string>{"--record", record});
     const auto replayed = figures({"replay", record});
     EXPECT_EQ(replayed.at("identical"), true);
@@ -93,40 +111,39 @@ TEST(Session, ForcesDependOnTheClockOnlyThroughWhatTheRecordSays)
 
 TEST(Session, ThePublicKeysOfTheFiguresAreThere)
 {
-    const Folder folder;
-    const std::string record = folder / "session.db";
-    expectKeys(figures(scripted + std::vector<std::string>{"--record", record}), {"/ticks",
-                                                                                  "/missed_ticks",
-                                                                                  "/overruns",
-                                                                                  "/gaps",
-                                                                                  "/longest_gap_ms",
-                                                                                  "/lateness_us/p50",
-                                                                                  "/lateness_us/p99",
-                                                                                  "/lateness_us/p999",
-                                                                                  "/lateness_us/max",
-                                                                                  "/tick_us/p50",
-                                                                                  "/tick_us/p99",
-                                                                                  "/tick_us/p999",
-                                                                                  "/tick_us/max",
-                                                                                  "/tasks_us/H2/p50",
-                                                                                  "/tasks_us/H3/p50",
-                                                                                  "/tasks_us/H4/p50",
-                                                                                  "/tasks_us/H5/p50",
-                                                                                  "/tasks_us/H6/p50",
-                                                                                  "/tasks_us/H7/p99",
-                                                                                  "/peak_force_n/basic",
-                                                                                  "/peak_force_n/additional",
-                                                                                  "/peak_force_n/total",
-                                                                                  "/model",
-                                                                                  "/score/total",
-                                                                                  "/core/0/fraction",
-                                                                                  "/core/0/length_in_lesion_mm",
-                                                                                  "/force_hash",
-                                                                                  "/peak_memory_mb"});
+    const auto& [folder, record, trained] = Recorded::once();
+    expectKeys(trained, {"/ticks",
+                         "/missed_ticks",
+                         "/overruns",
+                         "/gaps",
+                         "/longest_gap_ms",
+                         "/lateness_us/p50",
+                         "/lateness_us/p99",
+                         "/lateness_us/p999",
+                         "/lateness_us/max",
+                         "/tick_us/p50",
+                         "/tick_us/p99",
+                         "/tick_us/p999",
+                         "/tick_us/max",
+                         "/tasks_us/H2/p50",
+                         "/tasks_us/H3/p50",
+                         "/tasks_us/H4/p50",
+                         "/tasks_us/H5/p50",
+                         "/tasks_us/H6/p50",
+                         "/tasks_us/H7/p99",
+                         "/peak_force_n/basic",
+                         "/peak_force_n/additional",
+                         "/peak_force_n/total",
+                         "/model",
+                         "/score/total",
+                         "/core/0/fraction",
+                         "/core/0/length_in_lesion_mm",
+                         "/force_hash",
+                         "/peak_memory_mb"});
     expectKeys(figures({"replay", record}), {"/ticks", "/identical", "/first_difference_tick"});
     expectKeys(figures({"score", "--group", "a=" + record, "--group", "b=" + record}),
                {"/sessions/0", "/groups/0/name", "/groups/0/n", "/groups/0/median/total", "/effect_size"});
-    expectKeys(figures({"bench", "tick", "--voxels", "32,48"}),
+    expectKeys(figures({"bench", "tick", "block", "--model", "spring", "--voxels", "32,48"}),
                {"/cases/0/voxels_per_side", "/cases/0/tick_us_p50", "/cases/1/tick_us_p99", "/growth"});
     const auto query = figures({"bench", "query", "--elements", "32,48"});
     expectKeys(query, {"/cases/0/tool", "/cases/0/elements_per_side", "/cases/0/touch_us_p50", "/cases/0/touch_us_p99",
@@ -136,9 +153,8 @@ TEST(Session, ThePublicKeysOfTheFiguresAreThere)
 
 TEST(Session, ScoringTheRecordGivesTheLiveScore)
 {
-    const Folder folder;
-    const std::string record = folder / "session.db";
-    const auto live = figures(scripted + std::vector<std::string>{"--record", record}).at("score");
+    const auto& [folder, record, trained] = Recorded::once();
+    const auto live = trained.at("score");
     const auto scored = figures({"score", record}).at("sessions").at(0);
     EXPECT_GT(live.size(), 10U);
     for (const auto& [key, value] : live.items()) {
@@ -177,7 +193,7 @@ TEST(Session, ARecordThatExistsIsNeverTouched)
     const Folder folder;
     const std::string record = folder / "session.db";
     writeText(record, "mine");
-    expectRefusal(scripted + std::vector<std::string>{"--record", record}, record + ": exists already");
+    expectRefusal(scripted() + std::vector<std::string>{"--record", record}, record + ": exists already");
     EXPECT_EQ(readText(record), "mine");
 }
 
@@ -188,7 +204,7 @@ TEST(Session, AWindowThatCannotBeOpenedIsAnError)
         GTEST_SKIP() << "there is no palpate-view";
     }
     Program train("/usr/bin/env",
-                  {"DISPLAY=:9999", std::string(PALPATE_BIN_DIR) + "/palpate", "train", "layered", "--view"});
+                  {"DISPLAY=:9999", std::string(PALPATE_BIN_DIR) + "/palpate", "train", smallLayered(), "--view"});
     const Outcome outcome = train.wait();
     EXPECT_EQ(outcome.status, 1);
     EXPECT_NE(outcome.err.find("the window failed"), std::string::npos) << outcome.err;
@@ -201,7 +217,7 @@ TEST(Session, AnInterruptEndsItInOrder)
         SCOPED_TRACE(signal);
         const Folder folder;
         const std::string record = folder / "session.db", session = sessionName("interrupt");
-        Program train("palpate", {"train", "layered", "--headless", "--session", session, "--record", record});
+        Program train("palpate", {"train", smallLayered(), "--headless", "--session", session, "--record", record});
         ASSERT_TRUE(eventually([&] { return !train.running() || shownTick(session) > 300; }));
         const std::uint64_t seen = shownTick(session);
         train.send(signal);
@@ -213,7 +229,8 @@ TEST(Session, AnInterruptEndsItInOrder)
         EXPECT_TRUE(cut.complete());
         EXPECT_GT(seen, 300U);
         EXPECT_GE(cut.ticks(), seen);
-        EXPECT_LT(cut.ticks(), figures(scripted).at("ticks").get<std::uint64_t>()) << "it ran to its end all the same";
+        EXPECT_LT(cut.ticks(), Recorded::once().figures.at("ticks").get<std::uint64_t>())
+            << "it ran to its end all the same";
         EXPECT_EQ(figures({"replay", record}).at("identical"), true);
         EXPECT_FALSE(channel::Subscriber::attach(session)) << "the session's segment was left behind";
     }
@@ -230,7 +247,7 @@ TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
         const std::uint64_t when = moment(random);
         SCOPED_TRACE("killed at tick " + std::to_string(when));
         const std::string record = folder / ("session-" + std::to_string(run) + ".db");
-        Program train("palpate", {"train", "layered", "--headless", "--session", session, "--record", record});
+        Program train("palpate", {"train", smallLayered(), "--headless", "--session", session, "--record", record});
         ASSERT_TRUE(eventually([&] { return !train.running() || shownTick(session) >= when; }));
         const std::uint64_t seen = shownTick(session);
         train.send(SIGKILL);
@@ -247,18 +264,21 @@ TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
         EXPECT_EQ(replayed.at("identical"), true);
         EXPECT_EQ(replayed.at("ticks"), cut.ticks());
     }
-    EXPECT_EQ(palpate(scripted + std::vector<std::string>{"--seconds", "0.05", "--session", session}).status, 0);
+    EXPECT_EQ(palpate(scripted() + std::vector<std::string>{"--seconds", "0.05", "--session", session}).status, 0);
 }
 
 // Long enough at rest for a viewer to come up, then a press.
 constexpr const char* slowScene = R"(
 [volume]
 phantom = "layered"
+voxel_mm = 2
+[volume.parameters]
+width_mm = 40
 [target]
 structure = "tumour"
 [[script]]
 kind = "wait"
-seconds = 6
+seconds = 4
 [[script]]
 kind = "press"
 to_mm = [0, 1, 0]
@@ -311,8 +331,8 @@ public:
 
     std::vector<std::string> arguments() const
     {
-        return {"train",    "layered", "--headless", "--seconds", "0.2",        "--record", record(),
-                "--report", report(),  "--json",     figures(),   "--pictures", pictures()};
+        return {"train",    smallLayered(), "--headless", "--seconds", "0.2",        "--record", record(),
+                "--report", report(),       "--json",     figures(),   "--pictures", pictures()};
     }
     std::string record() const { return folder_ / "session.db"; }
     std::string report() const { return folder_ / "session.html"; }
@@ -349,7 +369,8 @@ TEST(Session, AModelThatNoMachineHoldsIsRefusedBeforeItStarts)
     const Folder folder;
     const std::string scene = folder / "absurd.toml", record = folder / "s.db";
     writeText(scene,
-              "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n[tool]\nkind = \"sphere\"\n"
+              "[volume]\nphantom = \"block\"\nvoxel_mm = 2\n[target]\nstructure = \"tumour\"\naim_mm = [0, 25, "
+              "0]\nentry_mm = [0, 0, 0]\n[tool]\nkind = \"sphere\"\n"
               "radius_mm = 10\n[model]\nlevel = \"elastic\"\n[model.elastic]\nwindow = 41\ncycles = 100\n");
     const std::vector<std::string> words{"train", scene, "--headless", "--seconds", "0.02", "--record", record};
     expectRefusal(words, "and there is 1 ms: choose a coarser [model]");
@@ -363,16 +384,22 @@ TEST(Session, AModelThatNoMachineHoldsIsRefusedBeforeItStarts)
 // Also while a scene is loaded, and in a benchmark.
 TEST(Interrupt, EndsWhatHasNothingToEndInOrderWithOneLine)
 {
+    constexpr std::array signals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
     const std::vector<std::vector<std::string>> commands{
         {"phantom", "breast", "--voxel", "0.3", "-o", "/dev/null"}, {"bench", "tick"}, {"bench", "needle"}, {"stability"}};
     for (const auto& words : commands) {
-        for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
-            Program program("palpate", words);
-            std::this_thread::sleep_for(400ms);
-            ASSERT_TRUE(program.running()) << words[0];
-            program.send(signal);
-            const Outcome outcome = program.wait();
-            EXPECT_EQ(outcome.status, 128 + signal) << words[0];
+        std::array<std::unique_ptr<Program>, signals.size()> programs;
+        for (auto& program : programs) {
+            program = std::make_unique<Program>("palpate", words);
+        }
+        std::this_thread::sleep_for(400ms);
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+            ASSERT_TRUE(programs[i]->running()) << words[0];
+            programs[i]->send(signals[i]);
+        }
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+            const Outcome outcome = programs[i]->wait();
+            EXPECT_EQ(outcome.status, 128 + signals[i]) << words[0];
             EXPECT_EQ(outcome.err, "palpate: interrupted\n") << words[0];
         }
     }
