@@ -1,5 +1,6 @@
-// Publishes the made-up body: publish_body SESSION play [FILE] | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not
-// shipped. The story begins when FILE is there: a viewer may take longer to start than the story lasts.
+// Publishes the made-up body: publish_body SESSION play [FILE] | hold SECONDS_OF_THE_STORY [VOXELS] | wave VOXELS. It is
+// not shipped. The story is told twice as fast, and begins when FILE is there: a viewer may take longer to start than it
+// lasts.
 #include <channel/channel.h>
 #include <tests/render/body.h>
 
@@ -15,11 +16,14 @@ namespace {
 
 using namespace palpate;
 
-void publish(const std::string& session, const std::string& mode, const std::string& word)
+constexpr int coarse = 52;
+
+void publish(const std::string& session, const std::string& mode, const std::string& word, int heldVoxels)
 {
     const double argument = mode == "play" ? 0 : std::atof(word.c_str());
     const bool wave = mode == "wave";
-    const int voxels = wave ? static_cast<int>(argument) : 104;
+    const int voxels = wave ? static_cast<int>(argument) : heldVoxels;
+    const double pace = mode == "play" ? 2e-3 : 1e-3;  // [s of the story], a tick
     const channel::Scenery scenery = render::bodyScenery(voxels, 0.104 / voxels);
     channel::Publisher publisher(session, scenery, render::bodyLabels(scenery));
     if (mode == "play" && !word.empty()) {
@@ -29,7 +33,7 @@ void publish(const std::string& session, const std::string& mode, const std::str
     }
     const auto start = std::chrono::steady_clock::now();
     for (std::uint64_t tick = 1;; ++tick) {
-        const double t = 1e-3 * static_cast<double>(tick);
+        const double t = pace * static_cast<double>(tick);
         channel::State state = render::storyState(scenery, mode == "hold" ? argument : wave ? 1.5 : t);
         state.tick = tick;
         if (tick % 16 == 1) {
@@ -56,7 +60,7 @@ int main(int argc, char** argv)
     if (argc < 3)
         return 2;
     try {
-        publish(argv[1], argv[2], argc > 3 ? argv[3] : "");
+        publish(argv[1], argv[2], argc > 3 ? argv[3] : "", argc > 4 ? std::atoi(argv[4]) : coarse);
         return 0;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "publish_body: %s\n", e.what());

@@ -76,7 +76,7 @@ struct Image {
 // One body and one window for all tests: both are slow to make.
 class Studio {
 public:
-    Studio() : labels(bodyLabels(scenery))
+    explicit Studio(int voxels = 104) : scenery(bodyScenery(voxels, 0.104 / voxels)), labels(bodyLabels(scenery))
     {
         if (!displayWorks())
             display_.emplace();
@@ -139,7 +139,7 @@ public:
     Picture& picture() { return *picture_; }
     void resize(int wide, int high) { window_->SetSize(wide, high); }
 
-    const channel::Scenery scenery = bodyScenery();
+    const channel::Scenery scenery;
     const std::vector<std::uint8_t> labels;
 
 private:

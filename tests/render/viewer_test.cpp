@@ -116,6 +116,22 @@ protected:
     {
         return {PUBLISH_BODY, session_, mode, argument};
     }
+    // In full detail.
+    std::vector<std::string> hold(const std::string& moment) const
+    {
+        return {PUBLISH_BODY, session_, "hold", moment, "104"};
+    }
+    // On a display of its own, which `server` describes. Each has another number: xvfb-run trips over a display that is
+    // just going.
+    std::vector<std::string> window(const std::string& server, const std::vector<std::string>& more) const
+    {
+        static int number = 99;
+        std::vector<std::string> command{
+            "xvfb-run", "-a",        "-n",    std::to_string(number += 10), "-s", "-noreset " + server,
+            program(),  "--session", session_};
+        command.insert(command.end(), more.begin(), more.end());
+        return command;
+    }
     std::vector<std::string> view(const std::vector<std::string>& more) const
     {
         std::vector<std::string> command{program(), "--session", session_, "--offscreen", pictures(), "--size", "800x600"};
@@ -142,7 +158,7 @@ protected:
     vtkSmartPointer<vtkImageData> pictureAt(const std::string& moment)
     {
         fs::remove_all(pictures());
-        Process publisher(publish("hold", moment), log("publisher"));
+        Process publisher(hold(moment), log("publisher"));
         Process viewer(view({"--frames", "2", "--every", "0.05"}), log("viewer"));
         EXPECT_EQ(viewer.wait(), 0) << said("viewer");
         vtkNew<vtkPNGReader> reader;
@@ -235,7 +251,7 @@ TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
 TEST_F(Viewer, WritesAPictureOfEveryEventAndEndsWithTheSession)
 {
     Process publisher(publish("play", pictures() + "/frame_00000.png"), log("publisher"));
-    Process viewer(view({"--every", "1"}), log("viewer"));
+    Process viewer(view({"--every", "0.5"}), log("viewer"));
     ASSERT_EQ(viewer.wait(), 0) << said("viewer");
     EXPECT_EQ(publisher.wait(), 0) << said("publisher");
     for (const char* name : {"frame_00000.png", "frame_00002.png", "000_contact.png", "001_inserted.png",
@@ -314,11 +330,8 @@ int countOnScreen(const fs::path& file, const Pixel& colour)
 
 TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
 {
-    // xvfb-run trips over a display that is just going.
-    std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.9"), log("publisher"));
-    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 800x600x24 -fbdir " + folder_.string(), program(),
-                    "--session", session_, "--size", "800x600", "--wait", "1"},
+    Process viewer(window("-screen 0 800x600x24 -fbdir " + folder_.string(), {"--size", "800x600", "--wait", "1"}),
                    log("viewer"));
     constexpr Pixel bar{89, 166, 255}, onSlice{64, 217, 255};
     int bars = 0, needle = 0;
@@ -351,11 +364,10 @@ int bodyOnScreen(const fs::path& file)
 // screen, where VTK's buffers are made anew in the midst of a picture, was the body missing from what came out.
 TEST_F(Viewer, TheBodyStaysOnTheScreenWhenMotionStops)
 {
-    std::this_thread::sleep_for(std::chrono::seconds(2));
-    Process publisher(publish("hold", "1.9"), log("publisher"));
-    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 800x600x24 -fbdir " + folder_.string(), program(),
-                    "--session", session_, "--size", "800x600", "--wait", "1", "--no-steps"},
-                   log("viewer"));
+    Process publisher(hold("1.9"), log("publisher"));
+    Process viewer(
+        window("-screen 0 800x600x24 -fbdir " + folder_.string(), {"--size", "800x600", "--wait", "1", "--no-steps"}),
+        log("viewer"));
     const fs::path screen = folder_ / "Xvfb_screen0";
     constexpr int some = viewWidth * viewHeight / 10;
     for (int i = 0; i < 600 && bodyOnScreen(screen) < some; ++i)
@@ -364,7 +376,7 @@ TEST_F(Viewer, TheBodyStaysOnTheScreenWhenMotionStops)
     const int whole = bodyOnScreen(screen);
     ASSERT_GE(whole, some) << said("viewer");
     int least = whole;
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(3500);
     while (std::chrono::steady_clock::now() < end) {
         least = std::min(least, bodyOnScreen(screen));
         std::this_thread::sleep_for(std::chrono::milliseconds(15));
@@ -376,11 +388,8 @@ TEST_F(Viewer, TheBodyStaysOnTheScreenWhenMotionStops)
 
 TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 {
-    std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.5"), log("publisher"));
-    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 1280x1024x24", program(), "--session", session_, "--size",
-                    "640x480", "--frames", "5", "--json", "-"},
-                   log("viewer"));
+    Process viewer(window("-screen 0 1280x1024x24", {"--size", "640x480", "--frames", "5", "--json", "-"}), log("viewer"));
     viewer.wait();
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
 }

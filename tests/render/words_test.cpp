@@ -13,10 +13,10 @@
 namespace palpate::render {
 namespace {
 
-// One window for its tests, as it is slow to make.
+// One window for its tests, as it is slow to make, and a coarse body, as it is made anew for each picture.
 class WordsTest : public testing::Test {
 protected:
-    static void SetUpTestSuite() { studio = std::make_unique<Studio>(); }
+    static void SetUpTestSuite() { studio = std::make_unique<Studio>(52); }
     static void TearDownTestSuite() { studio.reset(); }
 
     static std::unique_ptr<Studio> studio;
