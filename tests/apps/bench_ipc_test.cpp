@@ -33,7 +33,7 @@ TEST(BenchSync, TellsHowFarApartTwoViewersShowTheSameTick)
 {
     if (!built("palpate-view"))
         GTEST_SKIP() << "palpate-view has not been built";
-    const auto json = figures({"bench", "sync", "--seconds", "4", "--size", "320x320"});
+    const auto json = figures({"bench", "sync", "--seconds", "2", "--size", "320x320"});
     const auto &skew = json["skew_ms"], &state = json["state_ms"];
     EXPECT_GE(skew["p50"], 0.0);
     EXPECT_LE(skew["p50"], skew["p99"]);

@@ -24,12 +24,12 @@ TEST(Ct, AKeyOfTheWindowTakesAScan)
     ASSERT_NE(window, "");
     desktop.xdotool({"windowfocus", window});
     for (int i = 0; i < 3; ++i) {
-        std::this_thread::sleep_for(std::chrono::seconds(2));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1500));
         desktop.xdotool({"key", "p"});
     }
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
     while (!std::filesystem::exists(json) && std::chrono::steady_clock::now() < end) {
-        std::this_thread::sleep_for(std::chrono::seconds(1));
+        std::this_thread::sleep_for(std::chrono::milliseconds(500));
         desktop.xdotool({"key", "e"});
     }
     const auto score = nlohmann::json::parse(readText(json)).at("score");

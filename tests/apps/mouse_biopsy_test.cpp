@@ -63,7 +63,7 @@ public:
             words.insert(words.end(), {"keyup", "ctrl"});
         if (!words.empty())
             desktop_.xdotool(words);
-        wait(0.15);
+        wait(0.1);
     }
 
     void key(const std::string& name) const
@@ -138,8 +138,8 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     const std::string session = "desktop-" + std::to_string(::getpid());
     const Desktop desktop;
     const auto train =
-        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--close-at-end", "--seconds", "120",
-                                  "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
+        desktop.start("palpate", {"train", smallLayered(), "--device", "mouse", "--view", "--close-at-end", "--seconds",
+                                  "120", "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
     const std::string window = desktop.window("Palpate");
     const auto eyes = sessionWithHand(session);
     ASSERT_FALSE(window.empty());
@@ -181,7 +181,7 @@ TEST(Desktop, ASessionEndsWithTheWindowThatIsItsHand)
     const Folder folder;
     const std::string session = "closed-" + std::to_string(::getpid());
     const Desktop desktop;
-    const auto train = desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--seconds", "600",
+    const auto train = desktop.start("palpate", {"train", smallLayered(), "--device", "mouse", "--view", "--seconds", "600",
                                                  "--session", session, "--record", folder / "s.db"});
     ASSERT_FALSE(desktop.window("Palpate").empty());
     const auto eyes = sessionWithHand(session);
@@ -213,13 +213,13 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     const std::string session = "paused-" + std::to_string(::getpid());
     const Desktop desktop;
     const auto train =
-        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--close-at-end", "--seconds", "600",
-                                  "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
+        desktop.start("palpate", {"train", smallLayered(), "--device", "mouse", "--view", "--close-at-end", "--seconds",
+                                  "600", "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
     ASSERT_FALSE(desktop.window("Palpate").empty());
     auto eyes = sessionWithHand(session);
     ASSERT_TRUE(eyes);
-    const auto until = [&](const auto& holds) {
-        for (int i = 0; i < 200 && !holds(); ++i)
+    const auto until = [&](const auto& holds, int looks = 200) {
+        for (int i = 0; i < looks && !holds(); ++i)
             wait(0.05);
         return holds();
     };
@@ -247,8 +247,12 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     EXPECT_EQ(eyes->state()->tick, at);
     EXPECT_EQ(glm::length(vec(eyes->state()->total)), 0.0);
     ASSERT_TRUE(pressUntil("s", [&] { return eyes->state()->tick > at; }));
-    desktop.xdotool({"key", "u"});  // the ultrasound picture
-    ASSERT_TRUE(pressUntil("p", [&] { return stored() > 1; }));
+    desktop.xdotool({"key", "u"});  // the ultrasound picture, which takes a moment to be there
+    for (int i = 0; i < 60 && stored() == 1; ++i) {
+        desktop.xdotool({"key", "p"});
+        until([&] { return stored() > 1; }, 20);
+    }
+    ASSERT_GT(stored(), 1);
     ASSERT_TRUE(pressUntil("s", paused));
     ASSERT_TRUE(pressUntil("BackSpace", [&] { return eyes->ending() != channel::Ending::none; }));
     eyes = sessionWithHand(session);
@@ -256,7 +260,7 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     EXPECT_FALSE(paused());
     EXPECT_EQ(stored(), 1) << "pictures of the first attempt are gone, and no others";
     EXPECT_TRUE(std::filesystem::exists(pictures / "earlier.png"));
-    wait(2);
+    wait(1);
     ASSERT_TRUE(pressUntil("s", paused));
     const auto again = eyes->state()->tick;
     wait(1);
@@ -278,7 +282,7 @@ TEST(Desktop, ATryoutEndsByItselfAndLeavesNothing)
     if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Desktop desktop;
-    const auto train = desktop.start("palpate", {"train", "--tryout", "--device", "mouse", "--seconds", "3"});
+    const auto train = desktop.start("palpate", {"train", "--tryout", "--device", "mouse", "--seconds", "2"});
     EXPECT_FALSE(desktop.window("Palpate").empty());
     const Outcome outcome = train->wait();
     EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -68,7 +68,7 @@ struct Trainer {
         desktop.xdotool({"mousemove", std::to_string(x), std::to_string(y)});
         wait(0.3);
         desktop.xdotool({"click", button});
-        wait(0.7);
+        wait(0.4);
     }
     void mainButton() const { click(wide - 60, high - 38); }
     // Its window says in its title which screen it is at.
@@ -76,7 +76,7 @@ struct Trainer {
     void key(const std::string& name) const
     {
         desktop.xdotool({"key", name});
-        wait(0.7);
+        wait(0.4);
     }
     std::optional<channel::Subscriber> session() const
     {
@@ -134,21 +134,22 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
     // The needle waits on the planned line: the wheel alone goes along it.
     t.desktop.xdotool({"mousemove", "250", "400", "mousedown", "1"});
     wait(0.6);
-    const auto roll = [&](const char* way, auto until) {
+    const auto roll = [&](const char* way, int notches, auto until) {
         for (int i = 0; i < 150 && !until(*eyes->state()); ++i) {
-            t.desktop.xdotool({"click", way});
+            t.desktop.xdotool({"click", "--repeat", std::to_string(notches), "--delay", "40", way});
             wait(0.12);
         }
     };
-    roll("4", [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 4e-3; });
+    roll("4", 3, [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 12e-3; });
+    roll("4", 1, [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 4e-3; });
     t.desktop.xdotool({"click", "3"});
     wait(0.8);
     ASSERT_EQ(eyes->state()->cores, 1U) << "inserted by " << eyes->state()->inserted << " m, target at "
                                         << eyes->state()->distance[0] << " m, phase "
                                         << static_cast<int>(eyes->state()->phase);
-    roll("5", [](const channel::State& s) { return s.phase == channel::Phase::free; });
+    roll("5", 3, [](const channel::State& s) { return s.phase == channel::Phase::free; });
     t.desktop.xdotool({"mouseup", "1"});
-    wait(2);
+    wait(1);
     // On the words of the last step, below title and caption.
     for (int y = 40; y < 110 && eyes->ending() == channel::Ending::none; y += 8)
         t.click(60, y);
@@ -239,7 +240,7 @@ TEST(TrainerWindow, EscapeAsksBeforeItEndsASession)
     const Trainer t;
     const auto eyes = t.sessionBy([&] { t.key("Return"); });
     ASSERT_TRUE(eyes);
-    wait(2);
+    wait(1);
     t.key("Escape");
     wait(1);
     EXPECT_EQ(eyes->ending(), channel::Ending::none);
@@ -248,7 +249,7 @@ TEST(TrainerWindow, EscapeAsksBeforeItEndsASession)
     ASSERT_TRUE(t.isAt("Result"));
     wait(1);
     t.key("d");                         // nothing to see again
-    constexpr double longEnough = 5.0;  // a debrief opens its window in one
+    constexpr double longEnough = 4.0;  // a debrief opens its window in one
     EXPECT_TRUE(t.desktop.window("^Palpate$", longEnough).empty());
 }
 
@@ -293,8 +294,8 @@ TEST(TrainerWindow, KeysStayInTheSettingsWhenOneIsChanged)
     // Settings; English, Deutsch, colours as in the body; the next ones, and what is behind them.
     for (const char* key : {"shift+Tab", "Return", "Tab", "Tab", "Return", "Tab", "Return"}) {
         t.key(key);
-        wait(0.3);
     }
+    wait(0.6);
     EXPECT_TRUE(t.isAt("Case")) << "Enter chose a case behind the settings";
 }
 
