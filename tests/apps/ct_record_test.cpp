@@ -35,8 +35,8 @@ TEST(CtRecord, ATraineeScansAndTheRecordGivesTheScansAgain)
     EXPECT_EQ(palpate({"replay", record}).status, 0);
     expectRefusal({"export", "--record", record, "--at", "2s", "--what", "ct", "-o", folder / "e.nrrd"},
                   "are written as .png");
-    figures(
-        {"train", "layered", "--model", "spring", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
+    figures({"train", smallLayered(), "--model", "spring", "--unpaced", "--no-view", "--seconds", "1", "--record",
+             folder / "s.db"});
     expectRefusal({"export", "--record", folder / "s.db", "--at", "0.5s", "--what", "ct", "-o", folder / "f.png"},
                   "its scene has no CT");
 }

@@ -182,6 +182,17 @@ structure = "tumour"
     return file;
 }
 
+const std::string& threeSeconds()
+{
+    static const Folder folder;
+    static const std::string record = [] {
+        const std::string to = folder / "s.db";
+        figures({"train", smallLayered(), "--unpaced", "--no-view", "--seconds", "3", "--record", to});
+        return to;
+    }();
+    return record;
+}
+
 void expectRefusal(const std::vector<std::string>& arguments, const std::string& hint)
 {
     std::string line = "palpate";

@@ -40,7 +40,7 @@ TEST(ReplayView, WritesAPictureOfEveryAskedTimeAndEveryEvent)
     if (!canDraw())
         GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
     const Folder folder;
-    const auto session = figures({"train", "layered", "--unpaced", "--no-view", "--record", folder / "s.db"});
+    const auto session = figures({"train", smallLayered(), "--unpaced", "--no-view", "--record", folder / "s.db"});
     Program view("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures", "--every", "1", "--size",
                                   "400x320", "--json", "-"});
     const Outcome outcome = view.wait();
@@ -68,8 +68,8 @@ TEST(ReplayView, AnUnpacedSessionHasPicturesOfItsEvents)
     const Folder folder;
     for (const bool recorded : {false, true}) {
         const fs::path to = folder / (recorded ? "second" : "first");
-        std::vector<std::string> command = {"train",     "layered",   "--setting",  "fast",
-                                            "--unpaced", "--no-view", "--pictures", to};
+        std::vector<std::string> command = {"train",     smallLayered(), "--setting",  "fast",
+                                            "--unpaced", "--no-view",    "--pictures", to};
         if (recorded)
             command.insert(command.end(), {"--record", folder / "s.db"});
         const Outcome outcome = palpate(command);
@@ -89,7 +89,9 @@ TEST(ReplayView, ARecordThatIsStillWrittenIsShownAsFarAsItWas)
     if (!canDraw())
         GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
     const Folder folder;
-    Program session("palpate", {"train", "find-lump", "--model", "spring", "--headless", "--no-view", "--seconds", "60",
+    const std::string scene = folder / "wait.toml";
+    writeText(scene, readText(smallLayered()) + "[[script]]\nkind = \"wait\"\nseconds = 60\n");
+    Program session("palpate", {"train", scene, "--model", "spring", "--headless", "--no-view", "--seconds", "60",
                                 "--record", folder / "s.db"});
     for (int i = 0; i < 600 && palpate({"score", folder / "s.db"}).status != 0; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
@@ -112,7 +114,7 @@ TEST(ReplayView, WritesEveryTickOnceWhereNoTimeBetweenPicturesIsAskedFor)
         GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
     const Folder folder;
     const auto session =
-        figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "0.01", "--record", folder / "s.db"});
+        figures({"train", smallLayered(), "--unpaced", "--no-view", "--seconds", "0.01", "--record", folder / "s.db"});
     const Outcome outcome = Program("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures",
                                                      "--every", "0", "--size", "320x320"})
                                 .wait();
@@ -125,7 +127,7 @@ TEST(ReplayView, WritesAFilmOrSaysThatFfmpegIsMissing)
     if (!canDraw())
         GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
     const Folder folder;
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
+    figures({"train", smallLayered(), "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
     const std::vector<std::string> film{"--replay", folder / "s.db", "--movie", folder / "s.mp4", "--size", "321x320"};
     const Outcome made = Program("palpate-view", film).wait();
     if (!installed("ffmpeg")) {
@@ -158,22 +160,20 @@ TEST(ReplayKeys, GoThroughTheRecordInBothDirections)
     if (!canDraw() || !installed("xdotool"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Folder folder;
-    const auto session =
-        figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
     const Desktop desktop;
-    const auto view = desktop.start("palpate-view", {"--replay", folder / "s.db", "--layout", "instructor", "--size",
+    const auto view = desktop.start("palpate-view", {"--replay", threeSeconds(), "--layout", "instructor", "--size",
                                                      "400x320", "--timeline", folder / "t.csv"});
     ASSERT_FALSE(desktop.window("Palpate").empty());
     const auto key = [&](const char* name) {
         desktop.xdotool({"key", name});
-        std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1000));
     };
     for (const char* name : {"space", "End", "Home", "period", "period", "comma", "shift+period", "Right", "Left", "q"})
         key(name);
     const Outcome outcome = view->wait();
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const auto ticks = ticksIn(folder / "t.csv");
-    const std::vector<std::uint64_t> asked{session["ticks"].get<std::uint64_t>() - 1, 0, 1, 2, 1, 34, 1034, 34};
+    const std::vector<std::uint64_t> asked{2999, 0, 1, 2, 1, 34, 1034, 34};
     ASSERT_GE(ticks.size(), asked.size());
     EXPECT_EQ(std::vector<std::uint64_t>(ticks.end() - static_cast<std::ptrdiff_t>(asked.size()), ticks.end()), asked);
 }
@@ -183,7 +183,7 @@ TEST(ReplayView, SaysThatARecordHasLostItsBeginning)
     if (!canDraw() || !installed("sqlite3"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and sqlite3 (packages xvfb and sqlite3)";
     const Folder folder;
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
+    fs::copy_file(threeSeconds(), folder / "s.db");
     const Outcome cut = Program("/usr/bin/env", {"sqlite3", folder / "s.db", "DELETE FROM ticks WHERE tick < 10;"}).wait();
     ASSERT_EQ(cut.status, 0) << cut.err;
     const Outcome window = Program("palpate-view", {"--replay", folder / "s.db", "--hidden"}).wait();
@@ -202,8 +202,8 @@ TEST(ReplayView, AGhostMayBeOfAnotherSettingButNotOfAnotherBody)
         words.insert(words.end(), what.begin(), what.end());
         figures(words);
     };
-    record("fast.db", {"layered", "--model", "elastic", "--setting", "fast"});
-    record("default.db", {"layered", "--model", "elastic", "--setting", "default"});
+    record("fast.db", {smallLayered(), "--model", "elastic", "--setting", "fast"});
+    record("default.db", {smallLayered(), "--model", "elastic", "--setting", "default"});
     record("other.db", {"block", "--model", "spring"});
     const auto beside = [&](const std::string& ghost) {
         return Program("palpate-view", {"--replay", folder / "fast.db", "--ghost", folder / ghost, "--offscreen",
@@ -222,9 +222,8 @@ TEST(ReplayView, PicturesThatASignalHasEndedAreSaidToBe)
     if (!canDraw())
         GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
     const Folder folder;
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
     Program view("palpate-view",
-                 {"--replay", folder / "s.db", "--offscreen", folder / "pictures", "--every", "0", "--size", "320x320"});
+                 {"--replay", threeSeconds(), "--offscreen", folder / "pictures", "--every", "0", "--size", "320x320"});
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (!fs::exists(folder / "pictures/frame_00001.png") && std::chrono::steady_clock::now() < end)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -241,8 +240,7 @@ TEST(ReplayView, AFilmThatASignalHasEndedIsSaidToBe)
         GTEST_SKIP() << "needs palpate-view, Xvfb and ffmpeg (packages xvfb and ffmpeg)";
     const Folder folder;
     const std::string film = folder / "s.mp4", session = "film-" + std::to_string(::getpid());
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
-    Program running("palpate", {"train", "layered", "--setting", "fast", "--no-view", "--device", "mouse", "--session",
+    Program running("palpate", {"train", smallLayered(), "--setting", "fast", "--no-view", "--device", "mouse", "--session",
                                 session, "--seconds", "120", "--anyway"});
     const auto interrupted = [&](const std::vector<std::string>& what) {
         std::vector<std::string> words{"--movie", film, "--size", "320x320"};
@@ -255,7 +253,7 @@ TEST(ReplayView, AFilmThatASignalHasEndedIsSaidToBe)
         view.send(SIGINT);
         return view.wait();
     };
-    const Outcome record = interrupted({"--replay", folder / "s.db"});
+    const Outcome record = interrupted({"--replay", threeSeconds()});
     EXPECT_EQ(record.status, 130);
     EXPECT_EQ(record.err, "palpate-view: interrupted: " + film + " ends before the record does\n");
     const Outcome live = interrupted({"--session", session});

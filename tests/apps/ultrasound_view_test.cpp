@@ -25,9 +25,8 @@ std::string pictureWith(const fs::path& folder, const std::string& words)
 TEST(Ultrasound, ARecordsPictureComesAgainBitForBit)
 {
     const Folder folder;
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
     const auto make = [&](const std::string& name, const std::vector<std::string>& how) {
-        std::vector<std::string> words{"export", "--record", folder / "s.db", "-o", folder / name};
+        std::vector<std::string> words{"export", "--record", threeSeconds(), "-o", folder / name};
         words.insert(words.end(), how.begin(), how.end());
         const Outcome outcome = palpate(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -37,10 +36,10 @@ TEST(Ultrasound, ARecordsPictureComesAgainBitForBit)
     EXPECT_EQ(make("b.png", {"--at", "2.5s"}), first);
     EXPECT_EQ(make("c.png", {"--like", folder / "a.png"}), first);
     EXPECT_NE(make("d.png", {"--at", "0.1s"}), first);
-    expectRefusal({"export", "--record", folder / "s.db", "-o", folder / "e.png", "--at", "9s"}, "the record runs from");
-    expectRefusal({"export", "--record", folder / "s.db", "-o", folder / "e.png", "--like", folder / "s.db"},
+    expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.png", "--at", "9s"}, "the record runs from");
+    expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.png", "--like", threeSeconds()},
                   "is no ultrasound image");
-    expectRefusal({"export", "--record", folder / "s.db", "-o", folder / "e.nrrd", "--what", "ultrasound", "--at", "1s"},
+    expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.nrrd", "--what", "ultrasound", "--at", "1s"},
                   "are written as .png");
 }
 
@@ -50,10 +49,9 @@ TEST(Ultrasound, APictureThatAViewerHasStoredIsTheRecords)
     if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool";
     const Folder folder;
-    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
     const Desktop desktop;
     const auto view = desktop.start(
-        "palpate-view", {"--replay", folder / "s.db", "--ultrasound", "--images", folder.path(), "--size", "480x400"});
+        "palpate-view", {"--replay", threeSeconds(), "--ultrasound", "--images", folder.path(), "--size", "480x400"});
     const std::string window = desktop.window("Palpate");
     ASSERT_NE(window, "");
     desktop.xdotool({"windowfocus", window});
@@ -61,7 +59,7 @@ TEST(Ultrasound, APictureThatAViewerHasStoredIsTheRecords)
         const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
         while (pictureWith(folder.path(), words).empty() && std::chrono::steady_clock::now() < end) {
             desktop.xdotool({"key", "p"});
-            std::this_thread::sleep_for(std::chrono::seconds(1));
+            std::this_thread::sleep_for(std::chrono::milliseconds(500));
         }
         return pictureWith(folder.path(), words);
     };
@@ -73,7 +71,7 @@ TEST(Ultrasound, APictureThatAViewerHasStoredIsTheRecords)
     const std::string bytes = readText(stored);
     EXPECT_NE(bytes.find("\"mirrored\":true"), std::string::npos);
     EXPECT_NE(bytes.find("\"gain_db\":2.0"), std::string::npos);
-    const Outcome again = palpate({"export", "--record", folder / "s.db", "--like", stored, "-o", folder / "again.png"});
+    const Outcome again = palpate({"export", "--record", threeSeconds(), "--like", stored, "-o", folder / "again.png"});
     ASSERT_EQ(again.status, 0) << again.err;
     EXPECT_EQ(readText(folder / "again.png"), bytes);
 }
