@@ -31,7 +31,7 @@ TEST(CommandLine, VersionSaysBuildKernelSetsAndLibraries)
 {
     const Outcome said = palpate({"--version"});
     EXPECT_EQ(said.status, 0);
-    const auto trained = figures({"train", "block", "--headless", "--unpaced", "--seconds", "0.001"});
+    const auto trained = figures({"train", smallLayered(), "--headless", "--unpaced", "--seconds", "0.001"});
     EXPECT_EQ(said.out.substr(0, said.out.find('\n')), trained.at("build").get<std::string>());
     EXPECT_TRUE(
         std::regex_search(said.out, std::regex("\nkernels +x86-64-v2, AVX2, AVX-512 \\(this machine runs x86-64-v2")));
@@ -165,8 +165,8 @@ TEST(CommandLine, AFileThatIsReadIsNotReplacedByWhatIsWritten)
     writeText(path, "seconds,x_mm,y_mm,z_mm\n0,0,-12,0\n0.1,0,-12,0\n");
     ASSERT_EQ(palpate({"phantom", "layered", "--voxel", "4", "-o", volume}).status, 0);
     ASSERT_EQ(palpate({"export", volume, "-o", labels}).status, 0);
-    ASSERT_EQ(palpate({"train", "layered", "--headless", "--unpaced", "--setting", "fast", "--seconds", "0.1", "--record",
-                       record})
+    ASSERT_EQ(palpate({"train", smallLayered(), "--headless", "--unpaced", "--setting", "fast", "--seconds", "0.1",
+                       "--record", record})
                   .status,
               0);
     ASSERT_EQ(palpate({"profile", "new", "ann", "--profiles", profiles}).status, 0);
@@ -235,7 +235,7 @@ TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedOnOneLine)
     const Folder folder;
     const std::string file = folder / "file", below = file + "/figures";
     writeText(file, "not a folder");
-    const Words session{"train", "layered", "--headless", "--unpaced", "--seconds", "0.1"};
+    const Words session{"train", smallLayered(), "--headless", "--unpaced", "--seconds", "0.1"};
     for (const std::string option : {"--json", "--record", "--report"}) {
         Words words = session;
         words.insert(words.end(), {option, below + ".db"});
@@ -244,7 +244,7 @@ TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedOnOneLine)
     expectRefusal({"phantom", "block", "-o", below + ".vdb"}, below);
     expectRefusal({"phantom", "block", "-o", folder / "block.vdb", "--json", below}, below);
     EXPECT_FALSE(std::filesystem::exists(folder / "block.vdb")) << "what cannot be written is looked at first";
-    ASSERT_EQ(palpate({"phantom", "block", "-o", folder / "block.vdb"}).status, 0);
+    ASSERT_EQ(palpate({"phantom", "block", "--voxel", "4", "-o", folder / "block.vdb"}).status, 0);
     expectRefusal({"info", folder / "block.vdb", "--json", below}, below);
 }
 
@@ -268,7 +268,7 @@ TEST(CommandLine, ASeedForAVolumeIsRefused)
 {
     const Folder folder;
     const std::string volume = folder / "block.vdb", scene = folder / "scene.toml";
-    ASSERT_EQ(palpate({"phantom", "block", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"phantom", "block", "--voxel", "4", "-o", volume}).status, 0);
     writeText(scene, "[volume]\nfile = \"block.vdb\"\n[target]\nstructure = \"tumour\"\n");
     for (const std::string& what : {volume, scene}) {
         expectRefusal({"train", what, "--headless", "--seed", "2"}, what + ": the volume is no phantom: --seed");
@@ -281,12 +281,12 @@ TEST(CommandLine, FiguresOnStandardOutputStandAlone)
     const Folder folder;
     const std::string record = folder / "session.db", report = folder / "report.html", volume = folder / "block.vdb";
     const std::vector<Words> commands{
-        {"train", "layered", "--headless", "--unpaced", "--seconds", "0.1", "--record", record, "--report", report},
+        {"train", smallLayered(), "--headless", "--unpaced", "--seconds", "0.1", "--record", record, "--report", report},
         {"replay", record},
         {"score", record, "--group", "all=" + record},
-        {"bench", "tick", "layered", "--voxels", "32"},
+        {"bench", "tick", "layered", "--model", "spring", "--voxels", "32"},
         {"bench", "query", "--elements", "32"},
-        {"phantom", "block", "-o", volume},
+        {"phantom", "block", "--voxel", "4", "-o", volume},
         {"info", volume}};
     for (Words words : commands) {
         words.insert(words.end(), {"--json", "-"});
@@ -300,8 +300,8 @@ TEST(CommandLine, FiguresOnStandardOutputStandAlone)
 TEST(CommandLine, GuidanceFadesOverTheTrialsOfAStudy)
 {
     const auto peaks = [](const Words& more) {
-        Words words{"train", "layered", "--headless", "--unpaced", "--seconds",
-                    "1.2",   "--model", "chainmail",  "--json",    "-"};
+        Words words{"train", smallLayered(), "--headless", "--unpaced", "--seconds",
+                    "1.2",   "--model",      "chainmail",  "--json",    "-"};
         words.insert(words.end(), more.begin(), more.end());
         const Outcome outcome = palpate(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;

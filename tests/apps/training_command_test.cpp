@@ -90,9 +90,8 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
         ASSERT_EQ(palpate({"profile", "new", name}).status, 0);
     }
     for (const char* const name : {"Smith,Jane", "bert"}) {
-        ASSERT_EQ(
-            palpate({"train", "--profile", name, "--case", "layered", "--headless", "--unpaced", "--seconds", "2"}).status,
-            0);
+        ASSERT_EQ(palpate({"train", smallLayered(), "--profile", name, "--headless", "--unpaced", "--seconds", "2"}).status,
+                  0);
     }
     const Outcome two = palpate({"progress", "--group", "a=Smith,Jane", "--group", "b=bert"});
     EXPECT_NE(two.out.find("a (n=1)"), std::string::npos) << two.out << two.err;
@@ -181,7 +180,7 @@ TEST_F(TrainingCommands, AnInterruptedSessionSaysThatItIsNotKept)
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
     const std::string record = folder_ / "cut.db";
     Program running("palpate",
-                    {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
+                    {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
     for (int i = 0; i < 300 && !fs::exists(record); ++i) {
         ::usleep(100000);
     }
@@ -202,7 +201,7 @@ TEST_F(TrainingCommands, ASessionThatIsToldThatItIsDoneIsKept)
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
     const std::string record = folder_ / "done.db";
     Program running("palpate",
-                    {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
+                    {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
     for (int i = 0; i < 300 && !fs::exists(record); ++i) {
         ::usleep(100000);
     }
@@ -218,8 +217,9 @@ TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
 {
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
     const std::string record = folder_ / "cut.db";
-    const Outcome cut = palpate({"train", "layered", "--profile", "anna", "--headless", "--unpaced", "--setting", "fast",
-                                 "--record", record, "--inject", "disk-full@1500ms", "--json", folder_ / "cut.json"});
+    const Outcome cut =
+        palpate({"train", smallLayered(), "--profile", "anna", "--headless", "--unpaced", "--setting", "fast", "--record",
+                 record, "--inject", "disk-full@1500ms", "--json", folder_ / "cut.json"});
     EXPECT_EQ(cut.status, 1);
     EXPECT_EQ(std::ranges::count(cut.err, '\n'), 1) << cut.err;
     EXPECT_NE(cut.err.find(record + ": recording stopped: "), std::string::npos) << cut.err;
@@ -237,8 +237,8 @@ TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
 TEST_F(TrainingCommands, ARecordThatAFullDiskCutIsMarkedByItsName)
 {
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
-    const Outcome cut = palpate({"train", "layered", "--profile", "anna", "--headless", "--unpaced", "--setting", "fast",
-                                 "--inject", "disk-full@1500ms"});
+    const Outcome cut = palpate({"train", smallLayered(), "--profile", "anna", "--headless", "--unpaced", "--setting",
+                                 "fast", "--inject", "disk-full@1500ms"});
     EXPECT_EQ(cut.status, 1);
     EXPECT_EQ(std::ranges::count(cut.err, '\n'), 1) << cut.err;
     std::string record;
@@ -261,7 +261,7 @@ TEST_F(TrainingCommands, ErasingRemovesRecordsOfTheWindowAndOfInterruptedSession
     const std::string window = folder_ / "palpate/sessions/touch.db", figures = folder_ / "palpate/sessions/touch.json";
     ASSERT_EQ(session("touch", {"--seconds", "2", "--record", window, "--json", figures}).status, 0);
     {
-        Program running("palpate", {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast"});
+        Program running("palpate", {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast"});
         const auto recorded = [&] {
             std::error_code none;
             return !fs::is_empty(folder_ / "palpate/records", none) && !none;
@@ -305,7 +305,7 @@ TEST_F(TrainingCommands, AFolderThatCannotBeMadeIsSaidInPlainWords)
 TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
 {
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
-    Program running("palpate", {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast"});
+    Program running("palpate", {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast"});
     const std::string name = "train-" + std::to_string(running.pid());
     const auto listed = [&]() -> nlohmann::json {
         const auto all = figures({"sessions"});
@@ -360,7 +360,7 @@ TEST_F(TrainingCommands, ACurriculumIsVerifiedBySimulatedPeople)
 TEST_F(TrainingCommands, ACaseIsMadeOfAVolumeAndTrained)
 {
     const std::string volume = folder_ / "v.vdb";
-    ASSERT_EQ(palpate({"phantom", "layered", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"phantom", "layered", "--voxel", "2", "--set", "width_mm=40", "-o", volume}).status, 0);
     ASSERT_EQ(palpate({"case", "new", volume, "-o", folder_ / "mine", "--licence", "CC0-1.0"}).status, 0);
     expectRefusal({"case", "new", volume, "-o", folder_ / "mine"}, "exists already");
     ASSERT_EQ(palpate({"case", "new", volume, "-o", (folder_ / "slash").string() + "/", "--licence", "CC0-1.0"}).status, 0);
