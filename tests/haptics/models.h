@@ -17,19 +17,26 @@ inline haptics::SessionModel modelOf(const std::string& text)
 }
 
 /// Flat skin, fat, gland with a tumour, muscle on bone; the skin is the plane y = 0 and the body lies behind it (+y).
-inline const std::string layeredScene = R"(name = "layers"
+inline std::string layeredSceneOf(int width)
+{
+    return R"(name = "layers"
 [volume]
 phantom = "layered"
 voxel_mm = 1.0
 [volume.parameters]
 tumour_diameter_mm = 12
 tumour_depth_mm = 20
+width_mm = )" +
+           std::to_string(width) + R"(
 [[vital]]
 name = "bone"
 warn_mm = 5
 [target]
 structure = "tumour"
 )";
+}
+
+inline const std::string layeredScene = layeredSceneOf(40);
 
 inline const haptics::SessionModel& layeredNeedle()
 {

@@ -227,7 +227,7 @@ TEST(Probe, ANeedleThatComesAndGoesLeavesItsForce)
 // The hands of a trainee, live: everything that the record has of the probe comes again bit for bit, and so does the score.
 TEST(Probe, ARecordHasItAndAReplayGivesItAgain)
 {
-    const auto model = tests::modelOf(tests::layeredScene +
+    const auto model = tests::modelOf(tests::layeredSceneOf(80) +
                                       "[model]\nsetting = \"fast\"\n[probe]\nkind = \"linear\"\nover_target = true\n" +
                                       "[[probe_step]]\nat_s = 0.3\npress_mm = 2\n");
     SessionInfo info = infoOf(model);
@@ -269,7 +269,7 @@ TEST(Probe, ARecordHasItAndAReplayGivesItAgain)
 // On flat skin the face lies over the target, and the needle comes in beside the housing, in the picture's plane.
 TEST(Probe, LiesOverTheTargetWithTheNeedleInItsPlane)
 {
-    const auto model = tests::modelOf(tests::layeredScene + "[probe]\nkind = \"linear\"\nover_target = true\n");
+    const auto model = tests::modelOf(tests::layeredSceneOf(80) + "[probe]\nkind = \"linear\"\nover_target = true\n");
     const auto& probe = model.scene.probe;
     const Vec3 middle(0, 26e-3, 0);
     EXPECT_LT(glm::distance(model.approach.aim, middle), 1e-3);
@@ -346,7 +346,7 @@ TEST(Probe, MeasuresFollowFromWhatThePictureHad)
 // The better the skill, the more of the needle stays in the picture; over seeds.
 TEST(Probe, WhoKnowsHowKeepsTheNeedleInThePicture)
 {
-    const auto model = tests::modelOf(tests::layeredScene +
+    const auto model = tests::modelOf(tests::layeredSceneOf(80) +
                                       "[model]\nlevel = \"spring\"\n[probe]\nkind = \"linear\"\nover_target = true\n");
     const auto meanOf = [&](const char* who) {
         double tip = 0.0;

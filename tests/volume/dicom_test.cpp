@@ -25,6 +25,13 @@
 #include <random>
 
 namespace palpate::volume {
+
+void loadDicomDictionary()
+{
+    dcmDataDict.rdlock();
+    dcmDataDict.rdunlock();
+}
+
 namespace {
 
 namespace fs = std::filesystem;

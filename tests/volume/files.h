@@ -26,4 +26,8 @@ inline std::string dicomVector(const Vec3& v)
     return fmt::format("{:.10g}\\{:.10g}\\{:.10g}", v.x, v.y, v.z);
 }
 
+/// Reads DCMTK's dictionary of tags. The importer reads each DICOM file in a process of its own, which has the dictionary
+/// of the one that began it, or reads it anew.
+void loadDicomDictionary();
+
 }  // namespace palpate::volume

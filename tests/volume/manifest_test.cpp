@@ -1,6 +1,7 @@
 // Real files of many writers, against counts that independent readers made (MANIFEST.md beside them).
 #include "manifest.h"
 
+#include <tests/volume/files.h>
 #include <volume/import.h>
 
 #include <fmt/format.h>
@@ -236,6 +237,7 @@ TEST(Manifest, EveryFileComesInAsCountedOrIsRefusedWithItsReason)
         GTEST_SKIP() << "no test volumes in " << PALPATE_TEST_DATA;
     }
     EXPECT_GT(rows.size(), 120U);
+    loadDicomDictionary();
     for (const Row& row : rows) {
         ASSERT_TRUE(fs::exists(row.path)) << row.name;
         ASSERT_NO_THROW(judge(row)) << row.name;

@@ -1,5 +1,6 @@
 // A small part of scripts/fuzz-import, the same in every run.
 #include <tests/fuzz/mutation.h>
+#include <tests/volume/files.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -17,6 +18,7 @@ TEST(Mutation, DamagedCopiesOfRealFilesAreTakenOrRefusedOnOneLine)
     }
     const auto files = seeds(PALPATE_TEST_DATA, 20000);
     ASSERT_GT(files.size(), 100U);
+    volume::loadDicomDictionary();
     const auto folder = std::filesystem::temp_directory_path() / fmt::format("palpate-mutation-{}", ::getpid());
     std::size_t taken = 0, refused = 0;
     for (unsigned i = 0; i < 600; ++i) {

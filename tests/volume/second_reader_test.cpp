@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 #include <tests/folder.h>
+#include <tests/volume/files.h>
 #include <tests/volume/itk_compiler.h>
 
 #include <itkGDCMImageIO.h>
@@ -91,6 +92,7 @@ void expectInside(const Second& second, const ImportedImage& image, const std::s
 
 TEST(SecondReader, AgreesOnEveryDicomSeries)
 {
+    loadDicomDictionary();
     int compared = 0;
     for (const manifest::Row& row : manifest::rows()) {
         if (!row.isSeries() || row.name.find("sliceincrement") != std::string::npos) {
