@@ -174,7 +174,7 @@ class Shape(unittest.TestCase):
 
 
     def test_the_first_picture_is_where_the_scene_has_the_probe(self):
-        session = palpate.Session(palpate.Scene("us-core-biopsy").changed({"model.setting": "fast"}))
+        session = palpate.Session(palpate.Scene("us-core-biopsy").changed({"model.setting": "fast", "volume.voxel_mm": 2}))
         before = session.ultrasound(160, 160)
         session.step(session.model.entry - 0.02 * np.array([0, 1, 0]))
         after = session.ultrasound(160, 160)
@@ -185,8 +185,11 @@ class Shape(unittest.TestCase):
 
 class Hands(InFolder):
     def test_a_scripted_hand_does_what_palpate_train_does(self):
-        figure = figures("train", "layered", "--unpaced", "--setting", "fast", "--seed", 1)
-        session = palpate.Session(palpate.Scene("layered").changed({"model.setting": "fast"}))
+        scene = palpate.Scene("layered").changed({"model.setting": "fast", "volume.voxel_mm": 2,
+                                                  "volume.parameters.width_mm": 40})
+        (self.folder / "layered.toml").write_text(scene.text)
+        figure = figures("train", self.folder / "layered.toml", "--unpaced", "--seed", 1)
+        session = palpate.Session(scene)
         ticks = session.perform("script")
         self.assertEqual(session.force_hash, figure["force_hash"])
         self.assertEqual(len(ticks), figure["ticks"])
