@@ -102,8 +102,9 @@ class Sweeps(InFolder):
 
 class Plans(unittest.TestCase):
     def test_a_plan_is_that_of_the_program(self):
-        smaller = {"width_mm": 42, "thickness_mm": 27, "tumour_centre_mm": 14, "tumour_diameter_mm": 10}
-        keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {"target.aim_mm.y": 14}
+        smaller = {"width_mm": 27, "thickness_mm": 18, "tumour_centre_mm": 9, "tumour_diameter_mm": 6}
+        keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {
+            "target.aim_mm.y": 9, "tool.radius_mm": 6}
         del keys["model.setting"]
         scene = palpate.Scene("block").changed(keys)
         ours = palpate.plan(scene, error=0.25, budget=1e-3)
