@@ -55,7 +55,8 @@ nlohmann::json figures(std::vector<std::string> arguments);
 /// and begins in a quarter of the time.
 const std::string& smallLayered();
 
-/// The record of three seconds in it without a clock, 3000 ticks: once for all tests of a process, which must not change it.
+/// The record of three seconds in it without a clock, 3000 ticks: once for all tests of a process, which must not change
+/// it.
 const std::string& threeSeconds();
 
 /// Checks that `palpate ARGUMENTS` fails with one line that names the program and holds `hint`.

@@ -392,7 +392,10 @@ TEST(Interrupt, EndsWhatHasNothingToEndInOrderWithOneLine)
         for (auto& program : programs) {
             program = std::make_unique<Program>("palpate", words);
         }
-        std::this_thread::sleep_for(400ms);
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+            ASSERT_TRUE(catches(*programs[i], signals[i])) << words[0];
+        }
+        std::this_thread::sleep_for(300ms);
         for (std::size_t i = 0; i < signals.size(); ++i) {
             ASSERT_TRUE(programs[i]->running()) << words[0];
             programs[i]->send(signals[i]);
