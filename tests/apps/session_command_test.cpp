@@ -415,7 +415,7 @@ TEST(Session, AnInterruptAfterItsEndStopsTheWaitForPictures)
     const auto over = [&] { return std::filesystem::exists(copy.record()) && haptics::Record(copy.record()).complete(); };
     ASSERT_TRUE(eventually([&] { return !train.running() || over(); }));
     ASSERT_TRUE(train.running());
-    std::this_thread::sleep_for(500ms);  // from the last byte of the record to the wait
+    std::this_thread::sleep_for(100ms);  // from the last byte of the record to the wait
     train.send(SIGINT);
     EXPECT_EQ(train.wait().status, 128 + SIGINT);
 }
