@@ -133,13 +133,13 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
 }
 
-// Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches less
-// than the cells of a window resolve, by Hertz's radius of what it touches; less so the deeper it is in its radii (measured
-// beside finite elements: docs/kernel.md). Tissue that something rigid confines gives way
-// less under the same pressure, by f^(1/3) where it bears f times what a half-space would at this depth, and so may they:
-// that is by how much the patch is wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force
-// on a small patch may be twice too large, and tissue that relaxes, whose force falls while it lies as before, take the
-// patch by the depth. All this is kept while a call solves, so that a call keeps one energy.
+// Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches
+// less than the cells of a window resolve, by Hertz's radius of what it touches, and the less so the deeper it is in
+// its radii (decision 321). Tissue that something rigid confines gives way less under the same pressure, by f^(1/3)
+// where it bears f times what a half-space would at this depth, and so may they: that is by how much the patch is
+// wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force on a small patch may be
+// twice too large, and tissue that relaxes, whose force falls while it lies as before, take the patch by the depth.
+// All this is kept while a call solves, so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
