@@ -32,7 +32,9 @@ void runMesher(const fs::path& mesher, const fs::path& volume, const fs::path& m
     const int status = base::run({{mesher.string(), volume.string(), "-o", mesh.string(), "--size",
                                    fmt::format("{:g}", 1e3 * size), "--largest", fmt::format("{:g}", 1e3 * growth * size)},
                                   {-1, said.number(), said.number()}});
-    base::failIf(status != 0, "palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log));
+    if (status != 0) {
+        throw base::error("palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log));
+    }
 }
 
 // Points and tetrahedra of a .msh as palpate-mesh writes it, and the tissue of each.

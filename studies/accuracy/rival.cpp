@@ -131,8 +131,12 @@ void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
         const std::string which = child.killed() ? "a signal" : fmt::format("signal {}", status - signalled);
         throw base::error("was ended by {}{}", which, lastWords(log));
     }
-    base::failIf(child.pid() > 0, "has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log));
-    base::failIf(status != 0, "exit status {}{}", status, lastWords(log));
+    if (child.pid() > 0) {
+        throw base::error("has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log));
+    }
+    if (status != 0) {
+        throw base::error("exit status {}{}", status, lastWords(log));
+    }
 }
 
 TrialResult compared(const RivalAnswer& answer, const TetBody& mesh, const AccuracySubject& subject,

@@ -15,7 +15,9 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
+#include <utility>
 
 namespace palpate::apps {
 
@@ -144,39 +146,12 @@ const std::string& smallLayered()
     static const Folder folder;
     static const std::string file = [] {
         const std::string to = folder / "layered.toml";
-        writeText(to, R"(name = "layered"
-[volume]
-phantom = "layered"
-voxel_mm = 2.0
-[volume.parameters]
-width_mm = 40
-skin_mm = 2
-fat_mm = 15
-gland_mm = 25
-muscle_mm = 10
-bone_mm = 6
-tumour_diameter_mm = 12
-tumour_depth_mm = 20
-[dffb]
-mode = "thesis"
-[dffb.surgery]
-force_n = 0.5
-mass_kg = 0.05
-damping_ns_m = 1.0
-stiffness_n_m = 100
-[dffb.structure]
-force_n = 0.6
-mass_kg = 0.05
-damping_ns_m = 1.0
-stiffness_n_m = 100
-[dffb.tissue]
-force_n = 0.4
-[[vital]]
-name = "bone"
-warn_mm = 5
-[target]
-structure = "tumour"
-)");
+        std::string text = readText(PALPATE_SOURCE_DIR "/datasets/scenes/layered.toml");
+        for (const auto& [old, fresh] : {std::pair<std::string_view, std::string_view>{"voxel_mm = 1.0", "voxel_mm = 2.0"},
+                                         {"[volume.parameters]", "[volume.parameters]\nwidth_mm = 40"}}) {
+            text.replace(text.find(old), old.size(), fresh);  // throws where it is not there
+        }
+        writeText(to, text);
         return to;
     }();
     return file;
