@@ -8,10 +8,18 @@
 #
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
+# PALPATE_BUILT: libraries to take from the build folder PALPATE_BUILT_IN instead, with this folder's sources as they were there.
 # UNINSTALLED: for a program of ours only: commands, pages and windows, in which no tick runs.
 function(palpate_library name)
   cmake_parse_arguments(arg "UNINSTALLED" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
   set(target palpate_${name})
+  if(name IN_LIST PALPATE_BUILT)
+    # As another preset has built it: no source is compiled here but an empty one.
+    file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/built.cpp CONTENT "")
+    set(arg_SOURCES ${CMAKE_CURRENT_BINARY_DIR}/built.cpp)
+    file(RELATIVE_PATH folder ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_BINARY_DIR})
+    set(arg_PUBLIC ${PALPATE_BUILT_IN}/${folder}/lib${target}.a ${arg_PUBLIC})
+  endif()
   add_library(${target} STATIC ${arg_SOURCES})
   add_library(palpate::${name} ALIAS ${target})
   target_sources(${target} PUBLIC

@@ -3,7 +3,7 @@
 
     list_suites.py FILE PREFIX SLOW ALONE PROGRAM...
 
-SLOW: a list as tests/slow.txt, or "". ALONE: a regular expression of suites that need the machine for themselves, or "".
+SLOW: lists as tests/slow.txt, separated by semicolons, or "". ALONE: a regular expression of suites that need the machine for themselves, or "".
 PROGRAM: with what it is started by.
 
 A test that SLOW names has an entry of its own, so that ctest can leave it out.
@@ -14,9 +14,9 @@ import subprocess
 import sys
 
 
-def slow_ones(path):
-    """Regular expressions of the list's lines, for names with the prefix."""
-    lines = pathlib.Path(path).read_text(encoding="utf-8").splitlines() if path else []
+def slow_ones(paths):
+    """Regular expressions of the lists' lines, for names with the prefix."""
+    lines = [line for path in paths.split(";") if path for line in pathlib.Path(path).read_text(encoding="utf-8").splitlines()]
     return [pattern for pattern in (line.partition("#")[0].strip() for line in lines) if pattern]
 
 

@@ -47,7 +47,7 @@ TEST(ForeignVdb, LabelsComeInWhereTheGridHasThem)
     EXPECT_NEAR(glm::length(labels.image.affine.toPatient({2, 0, 1}) - 0.5e-3 * Vec3(0, 1, 4)), 0, 1e-12);
     EXPECT_EQ(labels.warnings.size(), 2U);  // unit and frame are assumed
     EXPECT_NE(reason(written({grid, openvdb::FloatGrid::create()})).find("holds 2 grids"), std::string::npos);
-    EXPECT_NE(reason(written({openvdb::Vec3fGrid::create()})).find("not labels"), std::string::npos);
+    EXPECT_NE(reason(written({openvdb::BoolGrid::create()})).find("not labels"), std::string::npos);
     EXPECT_NE(reason(written({openvdb::FloatGrid::create()})).find("no voxel is set"), std::string::npos);
     std::filesystem::remove(written({grid}));
 }
