@@ -116,16 +116,7 @@ void addRecords(const ProfileArguments& o)
     std::vector<training::StoredSession> sessions;
     for (const fs::path& file : o.records) {
         training::StoredSession s = training::sessionOf(file);
-        if (!o.caseId.empty()) {
-            s.caseId = training::findCase(o.caseId).id;
-        }
-        if (!o.exercise.empty()) {
-            const auto [curriculum, exercise] = training::findExercise(o.exercise);
-            s.curriculum = curriculum.id;
-            s.exercise = exercise;
-            s.caseId = o.caseId.empty() ? curriculum.exercise(exercise)->caseId : s.caseId;
-        }
-        s.test = s.test || o.test;
+        training::declare(s, {o.caseId, o.exercise, o.test});
         sessions.push_back(std::move(s));
     }
     for (std::size_t i = 0; i < sessions.size(); ++i) {

@@ -158,7 +158,7 @@ Conclusion Training::keep(const haptics::SessionInfo& info, const session::Sessi
     s.curriculum = curriculum_ ? curriculum_->id : "";
     s.exercise = exercise_ != nullptr ? exercise_->id : "";
     s.test = options_.test;
-    s.guidance = options_.test ? 0 : exercise_ != nullptr ? training::guidanceOf(*exercise_, trial_, false) : 1;
+    s.guidance = training::guidanceIn(info);
     s.scene = info.scene;
     s.device = info.device;
     s.build = info.build;

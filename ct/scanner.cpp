@@ -1,6 +1,7 @@
 #include <ct/scanner.h>
 
 #include <base/cells.h>
+#include <base/ct_number.h>
 #include <base/png.h>
 #include <channel/needle_shape.h>
 
@@ -20,18 +21,12 @@ namespace {
 
 using channel::vec;
 
-constexpr float air = -1000, steel = 12000;    // [HU]; steel's own is off every scale
+constexpr auto air = static_cast<float>(base::ctNumberOfAir), steel = static_cast<float>(base::ctNumberOfSteel);  // [HU]
 constexpr int lowest = -1024, highest = 3071;  // of 12 bits
 constexpr double sharpness = 1.0e-3;           // full width at half maximum of a point in the slice [m], assumed
 constexpr double widest = 0.256;               // of the picture [m]
 constexpr double usualNoise = 12, usualDose = 10, usualWidth = 5e-3;  // [HU], [mGy], [m]
 constexpr int pixels = 320, planesOfSlice = 3;
-
-struct Point {
-    double density, number;  // [kg/m^3], [HU]
-};
-constexpr std::array<Point, 7> table{
-    {{1.21, -1000}, {930, -98}, {1030, 18.5}, {1110, 91.5}, {1160, 241.6}, {1925, 1534}, {7900, steel}}};
 
 // Weights of a point's spread, from its middle on.
 std::vector<float> spread(double pixel)
@@ -89,14 +84,6 @@ double distanceToNeedle(const channel::NeedleShape& needle, glm::dvec3 p)
 
 }  // namespace
 
-float numberOf(double density) noexcept
-{
-    const auto next = std::find_if(table.begin() + 1, table.end() - 1, [&](const Point& p) { return density < p.density; });
-    const Point &from = *(next - 1), &to = *next;
-    const double fraction = std::clamp((density - from.density) / (to.density - from.density), 0.0, 1.0);
-    return static_cast<float>(from.number + fraction * (to.number - from.number));
-}
-
 double noiseOf(double width, double doseIndex) noexcept
 {
     return usualNoise * std::sqrt(usualDose * usualWidth / (doseIndex * width));
@@ -117,7 +104,7 @@ struct Scanner::Plane {
 Scanner::Scanner(const channel::Scenery& scenery, std::span<const std::uint16_t> image) : scenery_(scenery)
 {
     for (std::size_t t = 1; t < number_.size(); ++t)
-        number_[t] = numberOf(static_cast<double>(scenery.sound[t].density));
+        number_[t] = base::ctNumberOf(static_cast<double>(scenery.sound[t].density));
     number_[0] = air;
     const std::string_view unit(scenery.imageUnit.data());
     if (unit == "HU")

@@ -15,10 +15,6 @@
 
 namespace palpate::ct {
 
-/// CT number of a tissue of `density` [kg/m^3], in Hounsfield units: Schneider, Bortfeld and Schlegel, Phys Med Biol
-/// 45:459, 2000, the other way round and without its steps. What is as dense as steel has what steel has.
-float numberOf(double density) noexcept;
-
 /// Standard deviation of the noise [HU] of slices of `width` [m] at a CTDIvol of `doseIndex` [mGy]: 12 HU at 10 mGy and
 /// 5 mm, assumed, as for an abdomen; it goes as 1 / sqrt(dose x width).
 double noiseOf(double width, double doseIndex) noexcept;

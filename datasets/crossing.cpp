@@ -147,7 +147,12 @@ void WayJudge::cross(Walk& walk, Vec3 p, double length, WayVerdict& out) const
         out.crossings.push_back({nameOf_[label], tissueOf_[label], 0});
     }
     out.crossings.back().length += length;
-    const bool soft = tissueOf_[label] != "lung" && role != Role::bone && role != Role::skin;
+    // An organ of the abdomen that is labelled is none of the mediastinum, also where lungs lie beside it, as beside the
+    // dome of the liver.
+    constexpr std::array<std::string_view, 8> noneOfIt{"lung",     "liver",       "spleen",  "kidney",
+                                                       "pancreas", "gallbladder", "stomach", "bowel"};
+    const bool soft =
+        role != Role::bone && role != Role::skin && std::ranges::find(noneOfIt, tissueOf_[label]) == noneOfIt.end();
     if (hasLung_ && soft && !walk.mediastinum && walk.label.size() % 6 == 0) {
         walk.mediastinum = inMediastinum(walk.reader, p);
     }

@@ -1,5 +1,6 @@
 #include <datasets/insert.h>
 
+#include <base/ct_number.h>
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/split.h>
@@ -30,14 +31,6 @@ std::vector<volume::LabelName> namesOf(const Tissue& tissue)
     return base::mapped<volume::LabelName>(tissue.structures(), [&](const volume::Structure& s) {
         return volume::LabelName{s.value, s.name, tissue.table().rows[s.tissue].name, s.colour, s.terminology};
     });
-}
-
-// The volume with other labels or another table; its image stays.
-Tissue rebuilt(const Tissue& tissue, const LabelImage& image, volume::TissueTable table,
-               const std::vector<volume::LabelName>& names, volume::Provenance provenance)
-{
-    const auto companion = tissue.companion();
-    return Tissue::fromLabels(image, std::move(table), names, std::move(provenance), companion ? &*companion : nullptr);
 }
 
 // Whether a point [m] lies in an insert.
@@ -73,6 +66,21 @@ private:
     Vec3 end_;
     Lump lump_;
 };
+
+// In CT, what is put in looks as its tissue does, and is as stiff as the table says.
+void drawIn(volume::CompanionImage& companion, const LabelImage& image, std::uint16_t label, double density)
+{
+    companion.stiffness.notOf.push_back(label);
+    if (companion.unit != "HU") {
+        return;
+    }
+    const float number = base::ctNumberOf(density);
+    for (std::size_t i = 0; i < image.values.size(); ++i) {
+        if (image.values[i] == label) {
+            companion.values[i] = number;
+        }
+    }
+}
 
 // Gives the voxels of the shape that hold tissue a new label; returns how many. `inside` says by label what holds tissue.
 std::size_t draw(LabelImage& image, const Shape& shape, const std::vector<char>& inside, std::uint16_t label)
@@ -164,6 +172,7 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
         used[s.value] = true;
     }
     auto provenance = tissue.provenance();
+    auto companion = tissue.companion();
     for (const Insert& insert : inserts) {
         base::failIf(!tissue.table().find(insert.tissue), "insert '{}': tissue '{}' is not in the volume's tissue table",
                      insert.name, insert.tissue);
@@ -180,17 +189,22 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
             throw base::error("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume", insert.name, c.x,
                               c.y, c.z);
         }
+        if (companion) {
+            drawIn(*companion, image, label, tissue.table().rows[*tissue.table().find(insert.tissue)].density);
+        }
         names.push_back({label, insert.name, insert.tissue});
         used[label] = true;
         inside[label] = 1;
         provenance.emplace_back("insert", insert.name);
     }
-    return rebuilt(tissue, image, tissue.table(), names, std::move(provenance));
+    return Tissue::fromLabels(image, tissue.table(), names, std::move(provenance), companion ? &*companion : nullptr);
 }
 
 Tissue withTable(const Tissue& tissue, volume::TissueTable table)
 {
-    return rebuilt(tissue, tissue.labels(), std::move(table), namesOf(tissue), tissue.provenance());
+    const auto companion = tissue.companion();
+    return Tissue::fromLabels(tissue.labels(), std::move(table), namesOf(tissue), tissue.provenance(),
+                              companion ? &*companion : nullptr);
 }
 
 std::vector<Vec3> loadLocations(const std::filesystem::path& file)

@@ -275,7 +275,7 @@ volume::StiffnessMap stiffnessMap(const std::string& nameOrFile, const std::stri
                    perhaps ? "the image does not say its unit: add --image-unit HU if it is CT"
                            : fmt::format("the image is in {}: give a map for that", unit.empty() ? "no known unit" : unit));
     }
-    volume::StiffnessMap map{pointsOf(top), {}};
+    volume::StiffnessMap map{pointsOf(top), {}, {}};
     if (const toml::node* node = top.node("tissues")) {
         const toml::array* list = node->as_array();
         for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {

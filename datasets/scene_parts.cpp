@@ -20,11 +20,24 @@ namespace {
 
 constexpr std::size_t maxProbeSteps = 1000;
 
-constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
-    {"depth_mm", "mm", 20, 250, 1e-3, &ProbeSpec::depth},
-    {"frequency_mhz", "MHz", 1, 20, 1e6, &ProbeSpec::frequency},
-    {"focus_mm", "mm", 5, 200, 1e-3, &ProbeSpec::focus},
+// As the transducers of ultrasound/transducer.h have them; a test compares.
+using ProbeFields = std::array<Field<ProbeSpec>, 3>;
+constexpr ProbeFields linearFields{{
+    {"depth_mm", "mm", 20, 80, 1e-3, &ProbeSpec::depth},
+    {"frequency_mhz", "MHz", 5, 14, 1e6, &ProbeSpec::frequency},
+    {"focus_mm", "mm", 5, 80, 1e-3, &ProbeSpec::focus},
 }};
+constexpr ProbeFields curvedFields{{
+    {"depth_mm", "mm", 60, 200, 1e-3, &ProbeSpec::depth},
+    {"frequency_mhz", "MHz", 2, 6, 1e6, &ProbeSpec::frequency},
+    {"focus_mm", "mm", 10, 200, 1e-3, &ProbeSpec::focus},
+}};
+constexpr double linearDepth = 40e-3, curvedDepth = 140e-3;  // their own [m]
+
+const ProbeFields& fieldsOf(const ProbeSpec& probe)
+{
+    return probe.kind == ProbeKind::curved ? curvedFields : linearFields;
+}
 
 using units::degree;
 constexpr std::array<Field<ProbeStep>, 7> probeStepFields{{
@@ -118,7 +131,13 @@ void readProbe(Section& top, ProbeSpec& probe)
         if (!probe.overTarget) {
             readPlace(*section, probe);
         }
-        readFields<ProbeSpec>(*section, probeFields, probe, Need::some);
+        readFields<ProbeSpec>(*section, fieldsOf(probe), probe, Need::some);
+        const double own = probe.kind == ProbeKind::curved ? curvedDepth : linearDepth,
+                     depth = probe.depth > 0 ? probe.depth : own;
+        section->refuseIf(probe.focus > depth, "focus_mm",
+                          fmt::format("must not be deeper than the picture, {:g} mm", 1e3 * depth), "mm");
+        section->refuseIf(probe.focus > 0 && probe.focus < 0.1 * depth, "focus_mm",
+                          fmt::format("must be at least a tenth of the picture's depth, {:g} mm", 1e2 * depth), "mm");
         section->finish();
     }
     for (Section& section : top.sections("probe_step")) {

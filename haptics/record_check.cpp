@@ -1,5 +1,6 @@
 #include <haptics/record_check.h>
 
+#include <base/split.h>
 #include <datasets/scene.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
@@ -26,6 +27,7 @@ public:
         next_ = tick + 1;
         ++ticks_;
     }
+    std::uint64_t ticks() const noexcept { return ticks_; }
     bool whole() const noexcept { return missing_ == 0; }
     std::string inWords() const
     {
@@ -54,6 +56,17 @@ std::string sealInWords(const Seal& seal, int format)
             break;
     }
     return {};
+}
+
+// Ticks that the servo loop left out: no tick has their time.
+std::string missedInWords(const Record& record, std::uint64_t ticks)
+{
+    constexpr std::uint64_t few = 200;  // one in so many
+    const std::uint64_t missed = base::numberIn<std::uint64_t>(record.result("missed_ticks")).value_or(0);
+    return missed * few <= ticks
+               ? ""
+               : fmt::format("{} ticks were missed beside {}: measures over time are too small by up to {:.1f} s", missed,
+                             ticks, 1e-3 * static_cast<double>(missed));
 }
 
 // The scene is text in the record, and so is what it was called.
@@ -100,6 +113,7 @@ RecordCheck checkRecord(const Record& record, std::string_view build)
         scorer.add(tick);
     });
     warn(continuity.inWords());
+    warn(missedInWords(record, continuity.ticks()));
     const std::string forces = record.result("force_hash"), now = fmt::format("{:016x}", hash.value());
     if (!forces.empty() && forces != now && continuity.whole()) {
         warn(fmt::format("its forces have the hash {}, and {} at the session's end", now, forces));

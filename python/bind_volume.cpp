@@ -13,6 +13,7 @@
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -177,6 +178,12 @@ Labels labelArray(const py::array& given)
     return Labels(given);
 }
 
+// A unit that is only nearly HU would leave out every check that is made of Hounsfield units.
+void checkUnit(const std::string& unit)
+{
+    refuseIf(!unit.empty() && unit != "HU", "image_unit: must be \"HU\", or \"\" for an image without a unit");
+}
+
 std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& affine, const py::dict& tissues,
                                      const py::object& image, const std::string& unit, const std::string& frame,
                                      const Path& table)
@@ -196,9 +203,12 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
         }
         refuseIf(values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape()),
                  "image: has to have the shape of the labels");
+        checkUnit(unit);
         companion.emplace();
         companion->unit = unit;
         companion->values.assign(values.data(), values.data() + values.size());
+        refuseIf(!std::ranges::all_of(companion->values, [](float v) { return std::isfinite(v); }),
+                 "image: has values that are not finite: give each voxel a number, e.g. with numpy.nan_to_num");
     }
     const auto names = namesOf(tissues);
     const py::gil_scoped_release others;
@@ -254,6 +264,7 @@ std::unique_ptr<VolumeBox> import(const Path& path, const std::map<std::string, 
                                   const std::string& stiffnessFrom, double voxel, bool bodyFromImage, double bodyFromHull,
                                   const Path& tissues)
 {
+    checkUnit(imageUnit);
     prepare::ImportRequest request;
     request.input = path;
     request.mapping.map = map;

@@ -2,6 +2,9 @@
 
 #include <muParser.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace palpate::sweep {
@@ -9,12 +12,18 @@ namespace palpate::sweep {
 double evaluate(const std::string& formula, const std::map<std::string, double>& values)
 {
     try {
-        mu::Parser parser;
-        for (const auto& [name, value] : values) {
+        mu::Parser parser, names;  // the second says which of them it uses; a formula may assign to its variables
+        std::map<std::string, double> variables = values;
+        for (auto& [name, value] : variables) {
             parser.DefineConst(name, value);
+            names.DefineVar(name, &value);
         }
         parser.SetExpr(formula);
-        return parser.Eval();
+        names.SetExpr(formula);
+        const double value = parser.Eval();
+        // A comparison with what is missing would be 0, a number like any other.
+        const auto isMissing = [](const auto& used) { return std::isnan(*used.second); };
+        return std::ranges::any_of(names.GetUsedVar(), isMissing) ? std::numeric_limits<double>::quiet_NaN() : value;
     } catch (const mu::Parser::exception_type& e) {
         throw std::runtime_error("formula '" + formula + "': " + e.GetMsg());
     }

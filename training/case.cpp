@@ -86,6 +86,15 @@ std::string lackOf(const datasets::Scene& scene, const std::string& key)
         constexpr std::array tasks{"biopsy", "palpation", "touch of the skin", "way in without a core"};
         return tasks[static_cast<std::size_t>(scene.task)];
     }
+    if (key == "vital_margin_mm") {
+        // Of the needle's tip inside.
+        if (scene.task == Task::find || scene.task == Task::touch || scene.tool.kind != datasets::ToolKind::needle) {
+            return "session without a needle in the tissue";
+        }
+        if (scene.vital.empty()) {
+            return "scene without [[vital]]";
+        }
+    }
     if (listed == Listed::ifProbe && scene.probe.kind == datasets::ProbeKind::none) {
         return "scene without [probe]";
     }
@@ -172,6 +181,12 @@ Case findCase(const std::string& id)
     base::failIf(fs::is_directory(id, none), "{}: no case: there is no {} in it", id, caseFile);
     throw base::error("{}: there is no such case{} (palpate case list)", id,
                       base::meant(id, base::mapped<std::string>(allCases(), &Case::id)));
+}
+
+std::string sceneName(const Case& of)
+{
+    const fs::path scene(of.scene);
+    return scene.extension() == ".vdb" ? scene.stem().string() : sceneOf(of).name;
 }
 
 std::string measureFault(const Case& of, const std::string& measure)

@@ -40,6 +40,9 @@ Case findCase(const std::string& id);
 /// Whether `what` is a folder with a case in it.
 bool isCaseFolder(const std::filesystem::path& what);
 
+/// The name of a case's scene, as its sessions have it. Throws std::runtime_error for a scene that cannot be read.
+std::string sceneName(const Case& of);
+
 /// Empty, or why sessions of a case never have this measure (a key of haptics::measures()). Reads the case's scene alone.
 /// Throws std::runtime_error for a scene that cannot be read.
 std::string measureFault(const Case& of, const std::string& measure);

@@ -48,6 +48,10 @@ Gate readGate(Section& section)
     gate.pass = static_cast<int>(section.integer("pass", "sessions", 1, gate.of).value_or(std::min(gate.pass, gate.of)));
     gate.testOnly = section.choice("mode", modeNames).value_or(0) == 1;
     gate.levels = base::mapped<Level>(section.sections("level"), readLevel);
+    for (auto level = gate.levels.begin(); level != gate.levels.end(); ++level) {
+        const bool again = std::ranges::find(gate.levels.begin(), level, level->measure, &Level::measure) != level;
+        section.refuseIf(again, "level", level->measure + " has two: put at_least and at_most into one");
+    }
     section.missingIf(gate.levels.empty(), "level", "at least one [[exercise.level]]: what opens the gate");
     return gate;
 }

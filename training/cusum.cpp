@@ -3,13 +3,17 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
+#include <utility>
 
 namespace palpate::training {
 
-constexpr std::size_t maxStates = 2000;  // of a chain; finer values are merged beyond
+constexpr std::size_t maxStates = 2000;  // of a chain
 
 std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& failed)
 {
@@ -29,43 +33,80 @@ std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& fa
     return points;
 }
 
+namespace {
+
+struct RunArrow {
+    std::size_t from, to;
+    double chance;
+};
+struct RunChain {
+    std::size_t states = 0;  // the first is 0; what has no arrow ends in a signal
+    std::vector<RunArrow> arrows;
+};
+struct RunStep {
+    double by, chance;
+};
+
+// All values that can be reached, by what is the same within rounding. None where there are too many.
+std::optional<RunChain> reachable(const std::array<RunStep, 2>& steps, double limit)
+{
+    constexpr double grain = 1e-9;
+    std::map<std::int64_t, std::size_t> index{{0, 0}};
+    std::vector<double> values{0};
+    RunChain chain;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        for (const RunStep& step : steps) {
+            const double next = std::max(0.0, values[i] + step.by);
+            if (step.chance <= 0 || next >= limit) {
+                continue;
+            }
+            const auto [at, made] = index.emplace(std::llround(next / grain), values.size());
+            if (made) {
+                values.push_back(next);
+            }
+            chain.arrows.push_back({i, at->second, step.chance});
+        }
+        if (values.size() > maxStates) {
+            return std::nullopt;
+        }
+    }
+    chain.states = values.size();
+    return chain;
+}
+
+// Evenly spaced values: a step that ends between two of them ends in both, so that it is as long on average as it is.
+RunChain spaced(const std::array<RunStep, 2>& steps, double limit)
+{
+    RunChain chain{maxStates, {}};
+    for (std::size_t i = 0; i < maxStates; ++i) {
+        for (const RunStep& step : steps) {
+            const double next = std::max(0.0, static_cast<double>(i) + step.by / limit * static_cast<double>(maxStates));
+            const auto below = static_cast<std::size_t>(std::min(next, static_cast<double>(maxStates)));
+            const double above = next - std::floor(next);
+            for (const auto& [to, share] : {std::pair(below, 1 - above), std::pair(below + 1, above)}) {
+                if (to < maxStates && step.chance * share > 0) {
+                    chain.arrows.push_back({i, to, step.chance * share});
+                }
+            }
+        }
+    }
+    return chain;
+}
+
+}  // namespace
+
 double averageRunLength(const CusumPlan& plan, CusumChart chart, double failureRate)
 {
     const double sign = chart == CusumChart::alarm ? 1 : -1;
     const double limit = (chart == CusumChart::alarm ? plan.alarmLimit() : plan.learningLimit()) - cusumTie;
-    const double steps[2] = {sign * plan.failureWeight(), sign * plan.successWeight()};
-    const double chances[2] = {failureRate, 1 - failureRate};
-
-    // All values that can be reached, by what is the same within rounding, or within the limit's share where there are
-    // many.
-    const double grain = std::max(1e-7, limit / static_cast<double>(maxStates));
-    std::map<std::int64_t, std::size_t> index;
-    std::vector<double> values;
-    const auto stateOf = [&](double value) {
-        const auto [at, made] = index.emplace(std::llround(value / grain), values.size());
-        if (made) {
-            values.push_back(value);
-        }
-        return at->second;
-    };
-    stateOf(0);
-    struct Arrow {
-        std::size_t from, to;
-        double chance;
-    };
-    std::vector<Arrow> arrows;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        for (int k = 0; k < 2; ++k) {
-            const double next = std::max(0.0, values[i] + steps[k]);
-            if (chances[k] > 0 && next < limit) {
-                arrows.push_back({i, stateOf(next), chances[k]});
-            }
-        }
-    }
+    const std::array<RunStep, 2> steps{
+        {{sign * plan.failureWeight(), failureRate}, {sign * plan.successWeight(), 1 - failureRate}}};
+    const auto few = reachable(steps, limit);
+    const auto [states, arrows] = few ? *few : spaced(steps, limit);
     // m = 1 + Q m, from the state 0.
-    const auto n = static_cast<Eigen::Index>(values.size());
+    const auto n = static_cast<Eigen::Index>(states);
     Eigen::MatrixXd system = Eigen::MatrixXd::Identity(n, n);
-    for (const Arrow& a : arrows) {
+    for (const RunArrow& a : arrows) {
         system(static_cast<Eigen::Index>(a.from), static_cast<Eigen::Index>(a.to)) -= a.chance;
     }
     const Eigen::PartialPivLU<Eigen::MatrixXd> solver(system);

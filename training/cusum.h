@@ -45,8 +45,8 @@ std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& fa
 enum class CusumChart { alarm, learning };
 
 /// Mean number of sessions until a chart signals, from 0 on, where a session fails with probability `failureRate`, each on
-/// its own. From the chart's Markov chain over all values that it can take, so without an approximation (D. Brook and D. A.
-/// Evans, "An approach to the probability distribution of cusum run length", Biometrika 59, 1972).
+/// its own. From the chart's Markov chain over all values that it can take, or over 2000 of them where there are more (D.
+/// Brook and D. A. Evans, "An approach to the probability distribution of cusum run length", Biometrika 59, 1972).
 /// @param failureRate  0 to 1; infinite where no signal can come
 double averageRunLength(const CusumPlan& plan, CusumChart chart, double failureRate);
 

@@ -41,7 +41,7 @@ bool meets(const Gate& gate, const Values& values) noexcept;
 
 /// What a row of sessions came to.
 struct GateState {
-    bool open = false;    // it was reached in one of the sessions; it stays open
+    bool open = false;    // it was reached in one of the sessions; later ones do not change it
     int openedAt = -1;    // index of the session that opened it; -1: none
     int counted = 0;      // sessions that count for the gate
     int recentMet = 0;    // of the last `of` that count

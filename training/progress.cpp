@@ -87,11 +87,14 @@ std::string reasonFor(const ExerciseProgress& next)
         return fmt::format("was reached, and not practised for {:.0f} days", std::floor(*next.daysSince));
     }
     const Gate& gate = next.exercise->gate;
-    if (next.sessions.empty()) {
-        return fmt::format("is next: {} of {} sessions at its level open the gate", gate.pass, gate.of);
+    const std::string_view what = gate.testOnly ? "tests" : "sessions";
+    if (next.gate.recentTried == 0) {
+        return fmt::format("{}: {} of {} {} at its level open the gate",
+                           next.sessions.empty() ? "is next" : "is not reached yet, with no test so far", gate.pass,
+                           gate.of, what);
     }
-    return fmt::format("is not reached yet: {} of the last {} sessions at its level, {} of {} are asked for",
-                       next.gate.recentMet, next.gate.recentTried, gate.pass, gate.of);
+    return fmt::format("is not reached yet: {} of the last {} {} at its level, {} of {} are asked for", next.gate.recentMet,
+                       next.gate.recentTried, what, gate.pass, gate.of);
 }
 
 }  // namespace palpate::training

@@ -155,11 +155,13 @@ std::string overview(const CurriculumProgress& c)
         const auto [colour, words] = stateOf(e, next);
         const std::string recent =
             e.gate.recentTried == 0 ? "-" : fmt::format("{} of last {}", e.gate.recentMet, e.gate.recentTried);
+        const std::string asked = fmt::format("{} of {}{}", e.exercise->gate.pass, e.exercise->gate.of,
+                                              e.exercise->gate.testOnly ? " tests" : "");
         out += fmt::format(
             "<tr><th>{}. {}</th><td><b class=\"state\" style=\"color:var(--{})\">{}</b></td><td class=\"n\">{}</td><td "
-            "class=\"n\">{} ({} of {})</td><td>{}</td><td>{}</td></tr>",
-            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recent, e.exercise->gate.pass,
-            e.exercise->gate.of, e.sessions.empty() ? "-" : signals(e), e.daysSince ? days(*e.daysSince) : "never");
+            "class=\"n\">{} ({})</td><td>{}</td><td>{}</td></tr>",
+            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recent, asked,
+            e.sessions.empty() ? "-" : signals(e), e.daysSince ? days(*e.daysSince) : "never");
     }
     return out + "</tbody></table></div><p class=\"note\">In brackets: what opens the gate.</p>";
 }

@@ -131,9 +131,23 @@ private:
 /// Clears who trained last in the settings of the trainer's window, where it is this person. Throws std::runtime_error.
 void forgetLastPerson(const std::filesystem::path& settings, const std::string& name);
 
+/// The fraction of the guiding force, 0 to 1, of a session: as it says, else by its scene; 0 in a test.
+/// Throws std::runtime_error for a scene that cannot be read.
+double guidanceIn(const haptics::SessionInfo& info);
+
 /// Takes in a session from its record, e.g. from another machine: measures computed from the ticks, what it was trained for
-/// from the record. Throws std::runtime_error where the person has it already, and for a record that was changed or not
-/// closed.
+/// from the record. Throws std::runtime_error for a record that was changed or not closed, and for a session that would not
+/// have counted: without a touch of the body, or with a fault.
 StoredSession sessionOf(const std::filesystem::path& record);
+
+/// What somebody says that a session was, where its record does not say it.
+struct Declared {
+    std::string caseId;    // empty: as in the record
+    std::string exercise;  // CURRICULUM/EXERCISE; empty: as in the record
+    bool test = false;
+};
+/// Throws std::runtime_error where the record says otherwise: another case or exercise, another scene, or guidance in a
+/// test.
+void declare(StoredSession& session, const Declared& as);
 
 }  // namespace palpate::training

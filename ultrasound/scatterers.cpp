@@ -123,7 +123,8 @@ void Scatterers::find(const View& view, const Medium& medium)
     ++pass_;
     const float half = beam.halfWidth() + edge_, apart = 0.5F * edge_, depth = beam.settings().depth + edge_;
     for (float z = beam.top() - edge_; z < depth; z += apart) {
-        const float wide = reach * beam.elevationSigma(z) + 0.4F * edge_;
+        const float farthest = beam.place(half, z).y;  // along a line, as the lens has it
+        const float wide = reach * std::max(beam.elevationSigma(z), beam.elevationSigma(farthest)) + 0.4F * edge_;
         const int steps = static_cast<int>(std::ceil(wide / apart));
         float from = -half, to = half;
         while (from < to && !nearPicture(beam, from, z))
@@ -219,7 +220,7 @@ void Scatterers::place(const View& view, glm::vec3 corner, const Pattern& q, Blo
         out.y[j] = m.y + x.y * q.x[j] + y.y * q.y[j] + z.y * q.z[j];
         out.z[j] = m.z + x.z * q.x[j] + y.z * q.y[j] + z.z * q.z[j];
     }
-    depth = m.z;
+    depth = view.beam().place(m.x, m.z).y;
     off = m.y;
 }
 
@@ -321,7 +322,7 @@ void Scatterers::splatPoint(const View& view, const Shade& shade, glm::vec3 p, f
     at.z[0] = p.z;
     Block block{};
     block.strength[0] = static_cast<std::uint8_t>(std::clamp(static_cast<int>(std::lround(2 * level)) + 128, 1, 255));
-    kernels().echoes(scaleAt(view, p.z), at);
+    kernels().echoes(scaleAt(view, view.beam().place(p.x, p.z).y), at);
     sum_.clear(echoes.lines, echoes.samples);
     add(view, shade, block, at);
     sum_.addTo(echoes);

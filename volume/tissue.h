@@ -44,6 +44,7 @@ struct MemoryUse {
 struct StiffnessMap {
     std::vector<std::pair<double, double>> points;  // value, factor; by value. None: the image changes nothing
     std::vector<std::string> tissues;               // of the table, that it applies to; none: all of them
+    std::vector<std::uint16_t> notOf;               // labels that it leaves as the table has them
 
     double factor(double value) const noexcept;  // of the modulus, at a value of the image
 };

@@ -184,7 +184,7 @@ std::vector<bool> scaledLabels(const TissueData& tissue)
         const std::string& name = tissue.table.rows[s.tissue].name;
         const bool meant =
             map.tissues.empty() || std::find(map.tissues.begin(), map.tissues.end(), name) != map.tissues.end();
-        scaled[s.value] = !map.points.empty() && meant;
+        scaled[s.value] = !map.points.empty() && meant && std::ranges::find(map.notOf, s.value) == map.notOf.end();
     }
     return scaled;
 }

@@ -183,6 +183,9 @@ json describe(const TissueData& t)
         out["image"] = {{"unit", t.imageUnit},
                         {"stiffness_points", t.stiffnessMap.points},
                         {"stiffness_tissues", t.stiffnessMap.tissues}};
+        if (!t.stiffnessMap.notOf.empty()) {
+            out["image"]["stiffness_not_of"] = t.stiffnessMap.notOf;
+        }
     }
     return out;
 }
@@ -222,6 +225,7 @@ void readDescription(const json& j, TissueData& t)
         t.imageUnit = image.at("unit").get<std::string>();
         t.stiffnessMap.points = image.at("stiffness_points").get<std::vector<std::pair<double, double>>>();
         t.stiffnessMap.tissues = image.at("stiffness_tissues").get<std::vector<std::string>>();
+        t.stiffnessMap.notOf = image.value("stiffness_not_of", std::vector<std::uint16_t>());
     }
 }
 

@@ -1,3 +1,4 @@
+#include <base/ct_number.h>
 #include <base/png.h>
 #include <ct/scanner.h>
 
@@ -88,7 +89,7 @@ TEST(CtNumber, FollowsThePublishedRelationOfDensity)
     };
     float before = -2000;
     for (double rho = 0.26; rho < 1.9; rho += 0.01) {
-        const float here = numberOf(1000 * rho);
+        const float here = base::ctNumberOf(1000 * rho);
         EXPECT_GT(here, before);
         // What lies between soft tissue and bone the lines step over, by 74 HU.
         if (rho < 1.105 || rho > 1.165) {
@@ -96,9 +97,9 @@ TEST(CtNumber, FollowsThePublishedRelationOfDensity)
         }
         before = here;
     }
-    EXPECT_FLOAT_EQ(numberOf(1.21), -1000);
-    EXPECT_FLOAT_EQ(numberOf(0), -1000);
-    EXPECT_GT(numberOf(9000), 10000);
+    EXPECT_FLOAT_EQ(base::ctNumberOf(1.21), -1000);
+    EXPECT_FLOAT_EQ(base::ctNumberOf(0), -1000);
+    EXPECT_GT(base::ctNumberOf(9000), 10000);
 }
 
 TEST(CtScan, TissueHasItsNumberAndTheNoiseOfTheDose)
@@ -114,8 +115,9 @@ TEST(CtScan, TissueHasItsNumberAndTheNoiseOfTheDose)
             const Sample fat = sampleOf(scan, k, 30e-3, 0, 15e-3), muscle = sampleOf(scan, k, 0, 0, 8e-3);
             EXPECT_NEAR(fat.deviation, noise, 0.06 * noise);
             // Noise is alike over some pixels: as if there were a tenth of them.
-            EXPECT_NEAR(fat.mean, numberOf(911), 4 * noise / std::sqrt(0.1 * static_cast<double>(fat.count)));
-            EXPECT_NEAR(muscle.mean, numberOf(1090), 4 * noise / std::sqrt(0.1 * static_cast<double>(muscle.count)));
+            EXPECT_NEAR(fat.mean, base::ctNumberOf(911), 4 * noise / std::sqrt(0.1 * static_cast<double>(fat.count)));
+            EXPECT_NEAR(muscle.mean, base::ctNumberOf(1090),
+                        4 * noise / std::sqrt(0.1 * static_cast<double>(muscle.count)));
         }
     }
 }
@@ -161,7 +163,7 @@ TEST(CtScan, ShowsTheBodyAsItIsDeformed)
             const double x = scan.corner.x + i * scan.pixel;
             if (std::abs(x) > 20e-3)
                 continue;
-            const double over = scan.at(1, i, scan.side / 2) - static_cast<double>(numberOf(911));
+            const double over = scan.at(1, i, scan.side / 2) - static_cast<double>(base::ctNumberOf(911));
             sum += over > 90 ? x : 0;
             weight += over > 90 ? 1 : 0;
         }
@@ -206,7 +208,7 @@ TEST(CtScan, ABodyThatCameWithCtHasItsNumbers)
     channel::Deformation body(cube.s, cube.labels);
     EXPECT_NEAR(sampleOf(Scanner(cube.s, image).scan(cube.state, body), 1, 0, 0, 20e-3).mean, 300, 3);
     std::strcpy(cube.s.imageUnit.data(), "");
-    EXPECT_NEAR(sampleOf(Scanner(cube.s, image).scan(cube.state, body), 1, 30e-3, 0, 10e-3).mean, numberOf(911), 3);
+    EXPECT_NEAR(sampleOf(Scanner(cube.s, image).scan(cube.state, body), 1, 30e-3, 0, 10e-3).mean, base::ctNumberOf(911), 3);
 }
 
 TEST(CtScan, AWindowGoesFromBlackToWhite)

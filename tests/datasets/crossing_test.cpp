@@ -20,7 +20,7 @@ using volume::Tissue;
 constexpr double voxel = 2e-3;
 const std::vector<LabelName> names{
     {1, "skin", "skin"},   {2, "soft tissue", "soft_tissue"}, {3, "left lung", "lung"}, {4, "right lung", "lung"},
-    {5, "colon", "bowel"}, {6, "mass", "idc_high_grade"},     {7, "kidney", "kidney"}};
+    {5, "colon", "bowel"}, {6, "mass", "idc_high_grade"},     {7, "kidney", "kidney"},  {8, "liver", "liver"}};
 
 double ball(Vec3 p, Vec3 middle)
 {
@@ -71,6 +71,15 @@ TEST(WayJudge, RefusesTheMediastinumWithTheReason)
     const Tissue tissue = tissueOf(trunk([](Vec3 p) { return ball(p, Vec3(0.0)) < 6e-3 ? 6 : lungs(p); }));
     const std::string error = errorOf(sceneFor(tissue), tissue);
     EXPECT_NE(error.find("through the mediastinum, between the lungs"), std::string::npos) << error;
+}
+
+// In a liver between the lungs, labelled as one, it is reached.
+TEST(WayJudge, TakesNoOrganOfTheAbdomenForTheMediastinum)
+{
+    const Tissue tissue = tissueOf(trunk([](Vec3 p) {
+        return ball(p, Vec3(0.0)) < 6e-3 ? 6 : lungs(p) != 0 ? lungs(p) : std::abs(p.x) < 0.013 ? 8 : 0;
+    }));
+    EXPECT_EQ(errorOf(sceneFor(tissue), tissue), "");
 }
 
 // A mass in a lung is reached through that lung, and through no other.

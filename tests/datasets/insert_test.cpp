@@ -1,3 +1,4 @@
+#include <base/ct_number.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
@@ -53,6 +54,39 @@ TEST(Insert, HasTheVolumeOfItsShape)
     Insert spiky = one;
     spiky.spiculated = true;
     EXPECT_NEAR(volumeOf(withInserts(block(), {&spiky, 1}), "lesion"), pi * d * d * d / 6, 0.1 * pi * d * d * d / 6);
+}
+
+// With an image that scales the stiffness: what is put in is as stiff as the table says and looks in CT as its tissue does;
+// a new table, and a file, change nothing of that.
+TEST(Insert, IsAsStiffAsTheTableSaysAndSeenInCt)
+{
+    const volume::Tissue plain = block();
+    volume::CompanionImage image;
+    image.unit = "HU";
+    image.values.assign(plain.labels().values.size(), -110);
+    image.stiffness.points = {{-110, 0.5}, {140, 2}};
+    std::vector<volume::LabelName> names;
+    for (const auto& s : plain.structures()) {
+        names.push_back({s.value, s.name, plain.table().rows[s.tissue].name});
+    }
+    const auto scaled = volume::Tissue::fromLabels(plain.labels(), plain.table(), names, {}, &image);
+    Insert one = ball({0, 20e-3, 0}, 14e-3);
+    one.tissue = "bone";
+    const tests::Folder folder;
+    const volume::Tissue with = withInserts(scaled, {&one, 1});
+    with.save(folder / "with.vdb");
+    const auto check = [&](const volume::Tissue& t) {
+        const volume::Tissue::Reader reader(t);
+        const auto bone = t.table().rows[*t.table().find("bone")], fat = t.table().rows[reader.tissue({0, 5e-3, 0})];
+        EXPECT_NEAR(reader.youngsModulus(one.centre) / bone.youngsModulus, 1, 1e-6);
+        EXPECT_NEAR(reader.youngsModulus({0, 5e-3, 0}) / fat.youngsModulus, 0.5, 1e-6);
+        const auto companion = t.companion();
+        const Index3 at(glm::round(t.affine().toIndex(one.centre)));
+        EXPECT_FLOAT_EQ(companion->values[t.labels().offset(at)], base::ctNumberOf(bone.density));
+    };
+    check(with);
+    check(withTable(with, with.table()));
+    check(volume::Tissue::load(folder / "with.vdb"));
 }
 
 // A volume may have labels up to the largest there is: inserts take free ones, and where there is none they are refused.

@@ -195,7 +195,7 @@ std::string errorOfMap(const std::string& text)
 
 TEST(StiffnessMap, IsLinearBetweenItsPointsAndConstantBeyond)
 {
-    const volume::StiffnessMap map{{{-50, 0.5}, {50, 1.5}, {100, 3}}, {}};
+    const volume::StiffnessMap map{{{-50, 0.5}, {50, 1.5}, {100, 3}}, {}, {}};
     EXPECT_DOUBLE_EQ(map.factor(-1000), 0.5);
     EXPECT_DOUBLE_EQ(map.factor(-50), 0.5);
     EXPECT_DOUBLE_EQ(map.factor(0), 1.0);

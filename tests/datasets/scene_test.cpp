@@ -66,9 +66,9 @@ Scene fullScene(std::mt19937_64& random)
                    .face = *scene.entry,
                    .direction = {0.6, 0.8, 0},
                    .lateral = {-0.8, 0.6, 0},
-                   .depth = draw(0.03, 0.2),
-                   .frequency = draw(2e6, 9e6),
-                   .focus = draw(0.01, 0.1),
+                   .depth = draw(0.12, 0.2),
+                   .frequency = draw(2e6, 6e6),
+                   .focus = draw(0.02, 0.1),
                    .script = {}};
     // One draw a statement: arguments have no order.
     ProbeStep first, second;
@@ -194,6 +194,10 @@ TEST(Scene, CtIsRefusedWhereItCannotBe)
     EXPECT_NE(refused("[ct]\nslice_mm = 0\n").find("must be 0.5 to 20 mm"), std::string::npos);
     EXPECT_NE(refused("[ct]\ndose = 1\n").find("dose"), std::string::npos);
     EXPECT_NE(refused("[ct]\n[probe]\nkind = \"linear\"\nover_target = true\n").find("not by both"), std::string::npos);
+    const std::string curved = "[probe]\nkind = \"curved\"\nover_target = true\n";
+    EXPECT_EQ(refused(curved + "focus_mm = 140\n"), "");
+    EXPECT_NE(refused(curved + "focus_mm = 141\n").find("must not be deeper than the picture, 140 mm"), std::string::npos);
+    EXPECT_NE(refused(curved + "depth_mm = 200\nfocus_mm = 19\n").find("must be at least a tenth"), std::string::npos);
 }
 
 // Linear between the steps, from where it begins; after the last it stays. Rocking turns both axes within the plane.

@@ -12,7 +12,9 @@
 #include <haptics/simulation.h>
 #include <haptics/trainee.h>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <ultrasound/transducer.h>
 
 #include <glm/geometric.hpp>
 
@@ -61,6 +63,32 @@ const TickRecord& press(Simulation& simulation, double depth, DeviceSample sampl
 }
 
 // The same capsule in the hand, lying on the block: the force is that of one body and one contact, whoever holds it.
+// A scene takes what a probe has and refuses what it would be scanned without: the two lists are one.
+TEST(Probe, AScenesSettingsAreThoseOfTheTransducer)
+{
+    for (const auto& [kind, t] :
+         {std::pair("linear", ultrasound::linearProbe()), std::pair("curved", ultrasound::curvedProbe())}) {
+        const auto refusal = [&](const char* key, float value) {
+            return tests::errorOf([&] {
+                datasets::parseScene(fmt::format("name = \"a\"\n[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 20, "
+                                                 "0]\n[probe]\nkind = \"{}\"\n"
+                                                 "over_target = true\n{} = {}\n",
+                                                 kind, key, value),
+                                     "a.toml");
+            });
+        };
+        for (const auto& [key, least, most] : {std::tuple("depth_mm", 1e3F * t.shallowest, 1e3F * t.deepest),
+                                               std::tuple("frequency_mhz", 1e-6F * t.lowest, 1e-6F * t.highest)}) {
+            EXPECT_EQ(refusal(key, std::round(least)), "");
+            EXPECT_EQ(refusal(key, std::round(most)), "");
+            EXPECT_NE(refusal(key, std::round(least) - 0.5F).find("must be"), std::string::npos);
+            EXPECT_NE(refusal(key, std::round(most) + 0.5F).find("must be"), std::string::npos);
+        }
+        EXPECT_EQ(refusal("focus_mm", std::floor(1e3F * t.depth)), "");
+        EXPECT_NE(refusal("focus_mm", 1e3F * t.depth + 1).find("deeper than the picture"), std::string::npos);
+    }
+}
+
 TEST(Probe, PressesLikeACapsuleOfItsShape)
 {
     const double depth = 3e-3;

@@ -128,6 +128,19 @@ TEST(RecordCheck, SaysWhichTicksAreMissingAndWhoseBuildItWas)
     }
 }
 
+// The servo loop left out a fifth of the session: its record has every tick that there was.
+TEST(RecordCheck, SaysHowMuchTimeWasMissed)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const auto check = [&](const char* name, const char* missed) {
+        synthetic::record(folder / name, synthetic::info(), synthetic::procedure(4, 0.8, 1), {{"missed_ticks", missed}});
+        return someOf(checkRecord(Record(folder / name), synthetic::info().build).warnings, 10);
+    };
+    EXPECT_NE(check("a", "800").find("800 ticks were missed"), std::string::npos) << check("a", "800");
+    EXPECT_NE(check("b", "800").find("too small by up to 0.8 s"), std::string::npos);
+    EXPECT_EQ(check("c", "2").find("missed"), std::string::npos);
+}
+
 // Every value is bounded before it is handed out; the error names it.
 TEST(RecordBounds, ValuesThatNoSessionHasAreRefused)
 {

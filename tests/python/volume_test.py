@@ -63,6 +63,14 @@ class FromNumpy(InFolder):
         volume = palpate.Volume.from_numpy(labels, AFFINE, TISSUES, image=image, image_unit="HU")
         np.testing.assert_array_equal(volume.image, image)
         self.assertEqual(volume.image_unit, "HU")
+        for unit in ("hu", "Hounsfield", " HU"):
+            with self.assertRaisesRegex(ValueError, "image_unit"):
+                palpate.Volume.from_numpy(labels, AFFINE, TISSUES, image=image, image_unit=unit)
+        for value in (np.nan, np.inf, 1e300):
+            broken = image.astype(float)
+            broken[0, 0, 0] = value
+            with self.assertRaisesRegex(ValueError, "not finite"):
+                palpate.Volume.from_numpy(labels, AFFINE, TISSUES, image=broken)
         self.assertIsNone(palpate.Volume.from_numpy(labels, AFFINE, TISSUES).image)
 
     def test_bad_arguments_are_refused_by_what_is_wrong(self):

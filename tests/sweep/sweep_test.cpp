@@ -1,4 +1,5 @@
 #include <sweep/case.h>
+#include <sweep/formula.h>
 #include <sweep/plan.h>
 
 #include <datasets/scene.h>
@@ -95,6 +96,18 @@ TEST(SweepPlan, AnAxisReachesWhatItNames)
     EXPECT_EQ(c.procedure.trainee, "novice");
     EXPECT_DOUBLE_EQ(c.procedure.delay, 3e-3);
     EXPECT_EQ(c.procedure.seed, 99U);
+}
+
+// What was not measured is neither over nor under a limit.
+TEST(Formula, IsMissingWhereANumberInItIs)
+{
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    for (const char* formula : {"a >= 5", "a < 5", "a < 5 ? 1 : 2", "b + 0 * a", "a > 1 || b > 0"}) {
+        EXPECT_TRUE(std::isnan(evaluate(formula, {{"a", none}, {"b", 1}}))) << formula;
+    }
+    EXPECT_EQ(evaluate("b > 0", {{"a", none}, {"b", 1}}), 1);
+    EXPECT_EQ(evaluate("a >= 5", {{"a", std::numeric_limits<double>::infinity()}}), 1);
+    EXPECT_THROW(evaluate("a = 5", {{"a", 1}}), std::runtime_error);
 }
 
 TEST(SweepPlan, FormulasRangesAndConstraints)

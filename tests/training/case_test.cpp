@@ -127,6 +127,7 @@ TEST(Curriculum, ErrorsNameFileLineAndKey)
     EXPECT_NE(load(one + level + one + level).find("there is an exercise of this name already"), std::string::npos);
     EXPECT_NE(load(one + "[[exercise.level]]\nmeasure = \"total\"\nat_least = 5\nat_most = 4\n").find("nothing can be"),
               std::string::npos);
+    EXPECT_NE(load(one + level + level).find("total has two"), std::string::npos) << load(one + level + level);
     EXPECT_NE(load("[cusum]\nacceptable_failure = 0.3\nunacceptable_failure = 0.2\n" + one + level)
                   .find("must be over acceptable_failure"),
               std::string::npos);

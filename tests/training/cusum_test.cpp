@@ -50,11 +50,25 @@ TEST(Cusum, RunLengthOfCertainSessions)
     EXPECT_TRUE(std::isinf(averageRunLength(plan, CusumChart::alarm, 0)));
 }
 
+// Who never fails is learnt when all successes together reach the limit, also where one of them hardly moves the chart.
+TEST(Cusum, RunLengthWhereTheRatesAreClose)
+{
+    for (const auto& [p0, p1] :
+         {std::pair(0.001, 0.002), std::pair(0.01, 0.011), std::pair(0.1, 0.101), std::pair(0.03, 0.07)}) {
+        const CusumPlan plan{.p0 = p0, .p1 = p1};
+        const double steps = std::ceil(plan.learningLimit() / -plan.successWeight());
+        EXPECT_NEAR(averageRunLength(plan, CusumChart::learning, 0) / steps, 1, 2e-2) << p0 << " and " << p1;
+        // Fewer failures: later alarms, sooner learnt.
+        EXPECT_LT(averageRunLength(plan, CusumChart::learning, 0.5 * p0), averageRunLength(plan, CusumChart::learning, p0));
+        EXPECT_GT(averageRunLength(plan, CusumChart::alarm, 0.5 * p0), averageRunLength(plan, CusumChart::alarm, p0));
+    }
+}
+
 // The charts as they are drawn, over simulated sessions, against the Markov chain. 4000 signals: the mean's standard error
 // is at most 1.6 %.
 TEST(Cusum, SignalsComeAsOftenAsTheMarkovChainSays)
 {
-    const std::vector<CusumPlan> plans{{}, {.p0 = 0.05, .p1 = 0.15, .alpha = 0.1, .beta = 0.1}};
+    const std::vector<CusumPlan> plans{{}, {.p0 = 0.05, .p1 = 0.15, .alpha = 0.1, .beta = 0.1}, {.p0 = 0.1, .p1 = 0.13}};
     std::mt19937_64 random(20261122);
     for (const CusumPlan& plan : plans) {
         for (const double failure : {plan.p0, 0.5 * (plan.p0 + plan.p1), plan.p1}) {

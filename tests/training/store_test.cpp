@@ -409,6 +409,36 @@ TEST(ProfileStore, TakesARecordInOnceAndNoneThatWasChanged)
     const Person anna = store.add("anna", Hand::right);
     store.store(anna, s);
     EXPECT_NE(errorOf([&] { store.store(anna, s); }).find("has this session already"), std::string::npos);
+    // What the record says is not said otherwise.
+    const auto refusal = [&](const Declared& as) {
+        return errorOf([&] {
+            StoredSession copy = s;
+            declare(copy, as);
+        });
+    };
+    EXPECT_NE(refusal({"behind-rib", "", false}).find("says near-vessel"), std::string::npos)
+        << refusal({"behind-rib", "", false});
+    EXPECT_NE(refusal({"", "breast-core-biopsy/touch", false}).find("says breast-core-biopsy/near-vessel"),
+              std::string::npos);
+    StoredSession other = s;
+    other.caseId = other.curriculum = other.exercise = "";
+    other.guidance = 1;
+    EXPECT_NE(errorOf([&] {
+                  declare(other, {"", "breast-core-biopsy/near-vessel", false});
+              }).find("is of the scene"),
+              std::string::npos);
+    EXPECT_NE(errorOf([&] { declare(other, {"", "", true}); }).find("with guidance"), std::string::npos);
+    other.scene = "near-vessel";
+    declare(other, {"", "breast-core-biopsy/near-vessel", false});
+    EXPECT_EQ(other.caseId, "near-vessel");
+    // Nobody has tried who never touched the body.
+    auto away = synthetic::procedure(4, 0.8, 1);
+    for (haptics::TickRecord& tick : away) {
+        tick.phase = haptics::Phase::free;
+        tick.eventCount = 0;
+    }
+    synthetic::record(folder / "away.db", info, away);
+    EXPECT_NE(errorOf([&] { sessionOf(folder / "away.db"); }).find("never touched"), std::string::npos);
     {
         Database record((folder / "s.db").string(), SQLITE_OPEN_READWRITE);
         record.execute("UPDATE session SET value = 'expert' WHERE key = 'operator'");

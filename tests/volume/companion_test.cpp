@@ -36,7 +36,7 @@ TEST(Companion, IsKeptInTheFile)
 {
     const Folder folder;
     const LabelImage image = block();
-    const CompanionImage companion = ramp(image, {{{0, 0.5}, {190, 1.5}}, {"fat"}});
+    const CompanionImage companion = ramp(image, {{{0, 0.5}, {190, 1.5}}, {"fat"}, {}});
     Tissue::fromLabels(image, table(), names(), {}, &companion).save(folder / "a.vdb");
     const Tissue loaded = Tissue::load(folder / "a.vdb");
     EXPECT_EQ(loaded.labels().values, image.values);
@@ -77,7 +77,7 @@ TEST(Companion, AFactorOfOneIsNone)
             const auto near = [&](Vec3 lump) { return glm::length(p - lump) < 6e-3; };
             return std::any_of(lumps.begin(), lumps.end(), near) ? hard : isBody(p) ? 1 : 0;
         });
-        const CompanionImage same = ramp(image, {{{0, 1.0}}, {}});
+        const CompanionImage same = ramp(image, {{{0, 1.0}}, {}, {}});
         const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
         const Tissue scaled = Tissue::fromLabels(image, table(), names(), {}, &same);
         const double spacing = std::array{1.6e-3, 2e-3, 4.1e-3}[trial % 3];
@@ -98,7 +98,7 @@ TEST(Companion, AFactorOfOneIsNone)
 TEST(Companion, ScalesTheStiffnessOfTheTissuesItIsMeantFor)
 {
     const LabelImage image = block();
-    const CompanionImage twice = ramp(image, {{{0, 2.0}}, {"fat"}});
+    const CompanionImage twice = ramp(image, {{{0, 2.0}}, {"fat"}, {}});
     const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
     const Tissue scaled = Tissue::fromLabels(image, table(), names(), {}, &twice);
     const NodeGrid grid = coveringGrid(plain.box(), 2e-3, 0);
