@@ -1,3 +1,5 @@
+#include <datasets/scene.h>
+#include <datasets/scene_text.h>
 #include <training/store.h>
 
 #include <haptics/record_format.h>
@@ -388,6 +390,26 @@ TEST(ProfileStore, ABackupIsTheWholeFile)
     EXPECT_EQ(copy.sessions(copy.find("anna")).size(), 1U);
     EXPECT_EQ(store.exported(anna)["sessions"].size(), 2U);
     EXPECT_EQ(store.exported(anna)["sessions"][1]["measures"]["vital_margin_mm"], "infinite");
+}
+
+// As a session says it, else by the scene that it had.
+TEST(ProfileStore, GuidanceIsThatOfTheSessionsScene)
+{
+    datasets::Scene scene = *datasets::builtInScene("layered");
+    haptics::SessionInfo info = synthetic::info();
+    const auto guidance = [&](datasets::DffbMode mode, double gain) {
+        scene.dffb.mode = mode;
+        scene.dffb.gain = gain;
+        info.sceneText = datasets::sceneText(scene);
+        return guidanceIn(info);
+    };
+    EXPECT_EQ(guidance(datasets::DffbMode::off, 1), 0);
+    EXPECT_EQ(guidance(datasets::DffbMode::field, 1), 1);
+    EXPECT_EQ(guidance(datasets::DffbMode::thesis, 0.25), 0.25);
+    info.extra.emplace_back(guidanceKey, "0.5");
+    EXPECT_EQ(guidance(datasets::DffbMode::field, 1), 0.5);
+    info.extra.emplace_back(modeKey, "test");
+    EXPECT_EQ(guidance(datasets::DffbMode::field, 1), 0);
 }
 
 TEST(ProfileStore, TakesARecordInOnceAndNoneThatWasChanged)
