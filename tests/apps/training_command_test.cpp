@@ -184,7 +184,7 @@ TEST_F(TrainingCommands, AnInterruptedSessionSaysThatItIsNotKept)
     for (int i = 0; i < 300 && !fs::exists(record); ++i) {
         ::usleep(100000);
     }
-    ::usleep(500000);
+    ::usleep(2500000);  // until it has touched the body: before that it would not count
     running.send(SIGINT);
     const Outcome cut = running.wait();
     EXPECT_EQ(cut.status, 128 + SIGINT);

@@ -86,7 +86,7 @@ TEST(CourseCheck, AFileThatCannotBeWrittenEndsTheCheck)
     const tests::Folder folder;
     const auto check = [&] {
         std::signal(SIGXFSZ, SIG_IGN);
-        const rlimit most{200 << 10, 200 << 10};
+        const rlimit most{100 << 10, 100 << 10};
         ::setrlimit(RLIMIT_FSIZE, &most);
         try {
             checkKills(breastCourse(), folder.path(), 1000, 3);
