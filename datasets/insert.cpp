@@ -14,6 +14,7 @@
 #include <charconv>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <string>
 
 namespace palpate::datasets {
@@ -67,18 +68,19 @@ private:
     Lump lump_;
 };
 
-// In CT, what is put in looks as its tissue does, and is as stiff as the table says.
-void drawIn(volume::CompanionImage& companion, const LabelImage& image, std::uint16_t label, double density)
+// What is put in is as stiff as the table says, and in CT it looks as its tissue does: `numberOf` has its label's number,
+// and NaN for all others.
+void drawIn(volume::CompanionImage& companion, const LabelImage& image, const std::vector<float>& numberOf)
 {
-    companion.stiffness.notOf.push_back(label);
-    if (companion.unit != "HU") {
-        return;
-    }
-    const float number = base::ctNumberOf(density);
-    for (std::size_t i = 0; i < image.values.size(); ++i) {
-        if (image.values[i] == label) {
-            companion.values[i] = number;
+    const bool isCt = companion.unit == "HU";
+    for (std::size_t label = 0; label < numberOf.size(); ++label) {
+        if (!std::isnan(numberOf[label])) {
+            companion.stiffness.notOf.push_back(static_cast<std::uint16_t>(label));
         }
+    }
+    for (std::size_t i = 0; isCt && i < image.values.size(); ++i) {
+        const float number = numberOf[image.values[i]];
+        companion.values[i] = std::isnan(number) ? companion.values[i] : number;
     }
 }
 
@@ -172,7 +174,7 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
         used[s.value] = true;
     }
     auto provenance = tissue.provenance();
-    auto companion = tissue.companion();
+    std::vector<float> numberOf(65536, std::numeric_limits<float>::quiet_NaN());
     for (const Insert& insert : inserts) {
         base::failIf(!tissue.table().find(insert.tissue), "insert '{}': tissue '{}' is not in the volume's tissue table",
                      insert.name, insert.tissue);
@@ -189,13 +191,15 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
             throw base::error("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume", insert.name, c.x,
                               c.y, c.z);
         }
-        if (companion) {
-            drawIn(*companion, image, label, tissue.table().rows[*tissue.table().find(insert.tissue)].density);
-        }
+        numberOf[label] = base::ctNumberOf(tissue.table().rows[*tissue.table().find(insert.tissue)].density);
         names.push_back({label, insert.name, insert.tissue});
         used[label] = true;
         inside[label] = 1;
         provenance.emplace_back("insert", insert.name);
+    }
+    auto companion = tissue.companion();
+    if (companion) {
+        drawIn(*companion, image, numberOf);
     }
     return Tissue::fromLabels(image, tissue.table(), names, std::move(provenance), companion ? &*companion : nullptr);
 }

@@ -58,7 +58,7 @@ std::string sealInWords(const Seal& seal, int format)
     return {};
 }
 
-// Ticks that the servo loop left out: no tick has their time.
+// Ticks that were sent late or left out: the time of those that were left out is in no tick.
 std::string missedInWords(const Record& record, std::uint64_t ticks)
 {
     constexpr std::uint64_t few = 200;  // one in so many
@@ -66,7 +66,7 @@ std::string missedInWords(const Record& record, std::uint64_t ticks)
     return missed * few <= ticks
                ? ""
                : fmt::format("{} ticks were missed beside {}: measures over time are too small by up to {:.1f} s", missed,
-                             ticks, 1e-3 * static_cast<double>(missed));
+                             ticks, static_cast<double>(missed) / record.info().rate);
 }
 
 // The scene is text in the record, and so is what it was called.

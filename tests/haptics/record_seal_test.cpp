@@ -132,13 +132,16 @@ TEST(RecordCheck, SaysWhichTicksAreMissingAndWhoseBuildItWas)
 TEST(RecordCheck, SaysHowMuchTimeWasMissed)
 {
     const synthetic::Folder folder(tests::memoryFolder());
-    const auto check = [&](const char* name, const char* missed) {
-        synthetic::record(folder / name, synthetic::info(), synthetic::procedure(4, 0.8, 1), {{"missed_ticks", missed}});
+    const auto check = [&](const char* name, const char* missed, double rate = 1000) {
+        SessionInfo info = synthetic::info();
+        info.rate = rate;
+        synthetic::record(folder / name, info, synthetic::procedure(4, 0.8, 1), {{"missed_ticks", missed}});
         return someOf(checkRecord(Record(folder / name), synthetic::info().build).warnings, 10);
     };
     EXPECT_NE(check("a", "800").find("800 ticks were missed"), std::string::npos) << check("a", "800");
     EXPECT_NE(check("b", "800").find("too small by up to 0.8 s"), std::string::npos);
     EXPECT_EQ(check("c", "2").find("missed"), std::string::npos);
+    EXPECT_NE(check("d", "800", 500).find("too small by up to 1.6 s"), std::string::npos);
 }
 
 // Every value is bounded before it is handed out; the error names it.
