@@ -169,6 +169,8 @@ void scoreRecord(const ScoreArguments& options)
     base::failIf(!options.report.empty() && groups.empty() && sessions.size() > 1,
                  "{}: a report is of one record or of groups: give one file, or --group NAME=FILE,FILE",
                  options.report.native());
+    base::failIf(!options.pictures.empty() && (options.report.empty() || !groups.empty()),
+                 "--pictures {}: needs --report of one record", options.pictures.native());
     warn(sessions);
     // First what a file that cannot be written takes from nobody.
     if (options.json != "-") {

@@ -101,6 +101,7 @@ void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& w
     palpate::command::addChoice(app, "--palette", words.palette,
                                 "Colours of tissues: standard (as in the body), or colour-blind (with patterns in slices)",
                                 {"standard", "colour-blind"});
+    app.add_flag("--watch", options.watches, "Only watch: never take the session's hand, nor pause or end it");
     app.add_flag("--sounds", options.sounds, "Play sounds for warnings (in a window)");
     palpate::command::addChoice(app, "--hand", words.hand, "Hand that holds the mouse; left swaps its buttons",
                                 {"right", "left"});

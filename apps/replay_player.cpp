@@ -131,9 +131,10 @@ struct ReplayPlayer::Impl {
             event.time = static_cast<double>(now.tick) * period;
             playback.recorded.add(event);
         }
+        playback.recorded.addTip(now);
         if (now.pictures > before.pictures) {
             showShape(simulation, buffer);
-            playback.recorded.add(now, {buffer.nodes.data(), buffer.count});
+            playback.recorded.addTaken(now, {buffer.nodes.data(), buffer.count});
         }
     }
 

@@ -65,8 +65,18 @@ void checkOutput(const fs::path& file)
     const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
     base::failIf(!fs::is_directory(folder, none), "{}: cannot be written: there is no folder {}: make it first",
                  file.native(), folder.native());
-    if (access(fs::exists(file, none) ? file.c_str() : folder.c_str(), W_OK) != 0) {
-        throw base::error("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno));
+    const auto mayWrite = [&](const fs::path& place, int how) {
+        if (access(place.c_str(), how) != 0) {
+            throw base::error("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno));
+        }
+    };
+    if (fs::exists(file, none)) {
+        mayWrite(file, W_OK);
+    }
+    if (!takesBytes(file)) {
+        // It is written beside its place and moved there, see writeWhole().
+        const fs::path place = replaceable(file);
+        mayWrite(place.has_parent_path() ? place.parent_path() : ".", W_OK | X_OK);
     }
 }
 

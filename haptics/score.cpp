@@ -224,14 +224,15 @@ Scorer::Scorer(const SessionInfo& info)
 
 void Scorer::add(const TickRecord& record) noexcept
 {
-    const Vec3 tip = record.device.position;
+    const Vec3 hand = record.device.position;
+    const Vec3 tip = hand + record.deflection;
     path_.add(tip);
     if (record.phase == Phase::free) {
         jerk_.pause();
     } else {
-        jerk_.add(tip, rate_);
+        jerk_.add(hand, rate_);
         // The force on the hand is what the tissue pushes back with.
-        score_.tissueWork -= ticks_ > 0 ? glm::dot(record.basic, tip - tip_) : 0.0;
+        score_.tissueWork -= ticks_ > 0 ? glm::dot(record.basic, hand - hand_) : 0.0;
     }
     ++ticks_;
     addMark(record);
@@ -249,6 +250,7 @@ void Scorer::add(const TickRecord& record) noexcept
     if (score_.scanDose > 0) {
         addScan(record);
     }
+    hand_ = hand;
     tip_ = tip;
     lastTick_ = record.tick;
 }
@@ -294,7 +296,7 @@ void Scorer::addDepth(const TickRecord& record) noexcept
         return;
     }
     addBeyond(record);
-    insidePath_.add(record.device.position);
+    insidePath_.add(record.device.position + record.deflection);
     score_.deepest = std::max(score_.deepest, depth);
     if (!withdrawing_) {
         depthPeak_ = std::max(depthPeak_, depth);

@@ -175,7 +175,7 @@ private:
     std::size_t structures_ = 0;
     Score score_;
     PathMeter path_, insidePath_;
-    Vec3 tip_{0.0};  // of the last tick [m]
+    Vec3 hand_{0.0}, tip_{0.0};  // of the last tick [m]
     std::uint64_t ticks_ = 0, lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
     std::uint64_t contactTicks_ = 0, restTicks_ = 0, vitalTicks_ = 0;
     double forceSum_ = 0;                     // [N]

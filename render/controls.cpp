@@ -78,7 +78,8 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
       playback_(options.playback),
       images_(options.images),
       steps_(options.steps),
-      leftHanded_(options.leftHanded)
+      leftHanded_(options.leftHanded),
+      watches_(options.watches)
 {
     if (options.tryout > 0)
         tryout_.emplace(options.tryout);
@@ -110,7 +111,8 @@ void Controls::keep()
 {
     if (const auto moved = spaceMouse_.moved(); moved != ultrasound::ProbeMove{})
         moveProbe(moved);
-    hand_.keep(follower_);
+    if (!watches_)
+        hand_.keep(follower_);
     picture_.setSteps(steps_, hand_.commands());
     if (tryout_ && follower_.known() && follower_.session() != nullptr)
         picture_.setCoaching(tryout_->see(follower_.session()->scenery(), follower_.state(), hand_.held()));
@@ -196,8 +198,8 @@ bool Controls::sceneHoldsProbe() const
 
 void Controls::storePicture()
 {
-    picture_.ultrasound().store(images_);
-    hand_.storePicture();
+    if (picture_.ultrasound().store(images_))
+        hand_.storePicture();
 }
 
 // By the keyboard: what the button of the index finger does while it is held.
@@ -245,9 +247,7 @@ void Controls::scrub()
 {
     if (!scrubbing_)
         return;
-    int width = 1, height = 1;
-    glfwGetFramebufferSize(window_, &width, &height);
-    playback_->jump = std::clamp(cursor_.x / std::max(width, 1), 0.0, 1.0) * playback_->length;
+    playback_->jump = picture_.timeAt(point(cursor_)) * playback_->length;
 }
 
 void Controls::showHelp()
@@ -262,15 +262,19 @@ bool Controls::asksToClose() const
     return closing_ && Clock::now() - *closing_ < toThink;
 }
 
-// The window that holds the tool ends the session as it goes, and the key is "back" elsewhere: it asks.
+// The window that commands a session ends it as it goes, and the key is "back" elsewhere: it asks.
 void Controls::close()
 {
-    const bool ends = hand_.is() && !tryout_ && follower_.state().status == channel::Status::running;
-    if (!ends || asksToClose()) {
-        glfwSetWindowShouldClose(window_, GLFW_TRUE);
+    const bool ends = hand_.commands() && !tryout_ && follower_.state().status == channel::Status::running;
+    if (ends && !asksToClose()) {
+        closing_ = Clock::now();
         return;
     }
-    closing_ = Clock::now();
+    if (ends) {
+        hand_.end();
+        hand_.keep(follower_);
+    }
+    glfwSetWindowShouldClose(window_, GLFW_TRUE);
 }
 
 std::string Controls::caption() const

@@ -139,6 +139,7 @@ private:
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool steps_ = true;       // are told in words
     bool leftHanded_ = false;
+    bool watches_ = false;  // only
     std::optional<Tryout> tryout_;
     std::optional<Clock::time_point>
         closing_;  // when the key that closes was pressed, and ended a session if pressed again

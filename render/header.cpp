@@ -81,12 +81,15 @@ std::string warningWords(const channel::Scenery& scenery, const channel::State& 
                 spokenHere(text(scenery.structure[s])), state.distance[s] * 1e3);
 }
 
-void drawTimeline(Column& column, double fraction)
+// Returns where the bar is.
+Area drawTimeline(Column& column, double fraction)
 {
     column.y -= 0.7 * column.font;
     const double high = 0.3 * column.font;
     column.canvas.rectangle({column.left, column.y}, {column.width, high}, dark);
     column.canvas.rectangle({column.left, column.y}, {column.width * std::min(fraction, 1.0), high}, amber);
+    return {static_cast<int>(column.left), static_cast<int>(column.y), static_cast<int>(column.width),
+            static_cast<int>(std::ceil(high))};
 }
 
 // A box of words below the title.
@@ -213,7 +216,7 @@ HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::S
                 places.step = box;
         }
         if (i == 0 && header.timeline >= 0)
-            drawTimeline(column, header.timeline);
+            places.timeline = drawTimeline(column, header.timeline);
     }
     places.bottom = column.y;
     return places;

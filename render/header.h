@@ -32,6 +32,7 @@ std::vector<std::string> wrapped(const Canvas& canvas, const std::string& words,
 
 struct HeaderPlaces {
     Area step;          // where the words of the step are; empty: there are none
+    Area timeline;      // the bar of a record; empty: there is none
     double bottom = 0;  // of all of it [pixels]
 };
 

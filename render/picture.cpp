@@ -203,7 +203,7 @@ void Picture::update(const channel::State& told, const channel::Displaced* displ
     session_->state = state;
     session_->health = health;
     session_->known = true;
-    session_->tool.update(session_->scenery, state, session_->deformation);
+    session_->tool.update(session_->scenery, state, session_->deformation, recorded_);
     session_->tool.showGhost(session_->scenery, ghost_, state.time);
     note(told);
 }
@@ -384,6 +384,7 @@ void Picture::drawFlat(const ScreenPlan& plan)
         lastStep_ = words.coaching.last;
         const HeaderPlaces places = drawHeader(canvas_, plan, s.scenery, s.state, words);
         step_ = places.step;
+        bar_ = places.timeline;
         below = places.bottom;
     }
     const bool grey = look_ != SliceLook::tissue && hasImage();
@@ -427,6 +428,14 @@ void Picture::setSteps(bool told, bool handIsHere)
 bool Picture::endsAt(Point2 pixel) const noexcept
 {
     return lastStep_ && step_.holds(pixel);
+}
+
+// A layout without the bar has the whole width for it.
+double Picture::timeAt(Point2 pixel) const noexcept
+{
+    const bool isDrawn = layout_ != Layout::body && !bar_.empty();
+    const Area bar = isDrawn ? bar_ : Area{0, 0, std::max(window_.GetSize()[0], 1), 1};
+    return std::clamp((pixel[0] - bar.x) / bar.width, 0.0, 1.0);
 }
 
 void Picture::show(Layout layout)

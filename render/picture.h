@@ -68,6 +68,8 @@ public:
     void setCoaching(std::optional<Coaching> words) { told_ = std::move(words); }
     /// Whether a click there ends the session: on the words of the last step.
     bool endsAt(Point2 pixel) const noexcept;
+    /// How much of the record is over where the bar of time has this pixel, in [0, 1].
+    double timeAt(Point2 pixel) const noexcept;
     /// `moving`: coarser where the renderer is software, so that the picture is finished in time.
     void render(Quality quality);
     /// Waits until the picture is drawn, and reckons with the time since `began`, when the work on it did begin, for the
@@ -153,6 +155,7 @@ private:
     std::optional<Coaching> told_;
     bool stepsTold_ = false, lastStep_ = false;
     Area step_;  // where the words of the step are
+    Area bar_;   // where that of a record is
     std::vector<KeyHelp> help_;
     Layout layout_ = Layout::trainee;
     SliceLook look_ = SliceLook::tinted;

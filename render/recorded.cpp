@@ -5,6 +5,11 @@
 #include <utility>
 
 namespace palpate::render {
+namespace {
+
+constexpr double rounding = 1e-9;  // of a time [s]
+
+}  // namespace
 
 void Recorded::add(const Event& event)
 {
@@ -12,17 +17,28 @@ void Recorded::add(const Event& event)
     events_.push_back(event);
 }
 
-void Recorded::add(const channel::State& state, std::span<const channel::Displacement> shape)
+void Recorded::addTaken(const channel::State& state, std::span<const channel::Displacement> shape)
 {
     auto taken = std::make_shared<const Taken>(Taken{state, {shape.begin(), shape.end()}});
     const std::lock_guard lock(guard_);
     taken_.push_back(std::move(taken));
 }
 
+void Recorded::addTip(const channel::State& state)
+{
+    const std::lock_guard lock(guard_);
+    way_.add(state);
+}
+
+std::vector<glm::dvec3> Recorded::wayUntil(double time) const
+{
+    const std::lock_guard lock(guard_);
+    return way_.until(time + rounding);
+}
+
 std::deque<Event> Recorded::eventsUntil(double time) const
 {
     constexpr std::ptrdiff_t most = 64;
-    constexpr double rounding = 1e-9;  // [s]
     const std::lock_guard lock(guard_);
     const auto end = std::ranges::upper_bound(events_, time + rounding, {}, &Event::time);
     return {end - std::min(most, end - events_.begin()), end};

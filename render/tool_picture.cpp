@@ -230,19 +230,12 @@ void ToolPicture::moveNeedle(const channel::Scenery& scenery, const channel::Sta
     setLine(*shaft_, std::span(shape).first(last + 1));
 }
 
-void ToolPicture::leaveTrail(const channel::State& state)
+// A viewer of a record jumps about in it.
+void ToolPicture::leaveTrail(const channel::State& state, const Recorded* recorded)
 {
-    constexpr double step = 0.3e-3;  // [m]
-    constexpr std::size_t most = 2000;
-    if (state.phase == channel::Phase::inserted && phase_ != channel::Phase::inserted)
-        trailPoints_.clear();
-    phase_ = state.phase;
-    const glm::dvec3 tip = vec(state.tip);
-    if (phase_ != channel::Phase::inserted || trailPoints_.size() >= most ||
-        (!trailPoints_.empty() && glm::distance(trailPoints_.back(), tip) < step))
-        return;
-    trailPoints_.push_back(tip);
-    setLine(*trail_, trailPoints_);
+    if (recorded == nullptr)
+        way_.add(state);
+    setLine(*trail_, recorded != nullptr ? recorded->wayUntil(state.time) : way_.until());
 }
 
 // The notch takes its core at the end of the throw: from the tip to there the inner needle is out.
@@ -313,14 +306,15 @@ void ToolPicture::showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip)
     setLine(*lead_, hand ? std::span<const glm::dvec3>(line) : std::span<const glm::dvec3>());
 }
 
-void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation)
+void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation,
+                         const Recorded* recorded)
 {
     const glm::dvec3 aim = deformation.seen(vec(scenery.aim));
     showCores(state, deformation);
     showMarks(scenery, state);
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
     aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
-    leaveTrail(state);
+    leaveTrail(state, recorded);
     glm::dvec3 axis = vec(state.axis);
     if (scenery.tool == channel::ToolKind::needle) {
         moveNeedle(scenery, state);

@@ -3,6 +3,8 @@
 #include <channel/layout.h>
 #include <render/deformation.h>
 #include <render/ghost.h>
+#include <render/recorded.h>
+#include <render/tip_way.h>
 
 #include <vtkActor.h>
 #include <vtkNew.h>
@@ -38,7 +40,9 @@ glm::dvec3 markedPlace(const channel::Scenery& scenery, const channel::Mark& mar
 class ToolPicture {
 public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
-    void update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation);
+    /// @param recorded  of a record, what is known of it; else null, and the states come in the order of time
+    void update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation,
+                const Recorded* recorded = nullptr);
     /// The tool of another session, where it was at `time` [s] of it, and the way of its tip up to there.
     void showGhost(const channel::Scenery& scenery, const Ghost& ghost, double time);
     /// Where the hand is that holds the tool [m], with a line to the `tip`; nothing: not shown.
@@ -47,7 +51,7 @@ public:
 private:
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
     void moveNeedle(const channel::Scenery& scenery, const channel::State& state);
-    void leaveTrail(const channel::State& state);
+    void leaveTrail(const channel::State& state, const Recorded* recorded);
     void showMarks(const channel::Scenery& scenery, const channel::State& state);
     void showCores(const channel::State& state, const Deformation& deformation);
 
@@ -61,9 +65,8 @@ private:
     std::array<vtkNew<vtkActor>, channel::maxMarks> marks_;
     vtkNew<vtkPolyData> thrown_;  // the inner needle while it is out [mm]
     std::uint32_t fired_ = 0;
-    double firedAt_ = -1;                  // [s]; negative: not lately
-    std::vector<glm::dvec3> trailPoints_;  // [m]
-    channel::Phase phase_ = channel::Phase::free;
+    double firedAt_ = -1;  // [s]; negative: not lately
+    TipWay way_;           // of a session that runs
 };
 
 }  // namespace palpate::render

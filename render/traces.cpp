@@ -23,6 +23,7 @@ struct Curve {
     Colour colour;
     double width;  // [pixels]
     std::function<double(const History::Moment&)> value;
+    bool least = false;  // of a pixel column: the smallest value counts
 };
 
 // A diagram over time: `top` is the value at its upper edge.
@@ -66,21 +67,10 @@ Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string
 // One point per pixel column is all that can be seen.
 void draw(const Diagram& d, const History& history, const Curve& curve)
 {
-    Point2 last{};
-    bool any = false;
-    for (std::size_t i = 0; i < history.moments.size(); ++i) {
-        const History::Moment& moment = history.moments[i];
-        const double value = curve.value(moment);
-        if (!std::isfinite(value))
-            continue;
-        const Point2 point{d.x(moment.time), d.y(value)};
-        if (any && point[0] - last[0] < 1 && i + 1 < history.moments.size())
-            continue;
-        if (any)
-            d.canvas.line(last, point, curve.width, curve.colour);
-        last = point;
-        any = true;
-    }
+    const auto points = history.columns(d.inner.width / traceSeconds, curve.value, curve.least);
+    for (std::size_t i = 1; i < points.size(); ++i)
+        d.canvas.line({d.x(points[i - 1].time), d.y(points[i - 1].value)}, {d.x(points[i].time), d.y(points[i].value)},
+                      curve.width, curve.colour);
 }
 
 void drawAll(const Diagram& d, const Area& area, const History& history, const std::vector<Curve>& curves)
@@ -144,6 +134,25 @@ void History::add(const channel::State& state)
     any_ = true;
 }
 
+// Columns begin at multiples of their width in the session's time: they do not change as time goes on.
+std::vector<History::Point> History::columns(double perSecond, const std::function<double(const Moment&)>& valueOf,
+                                             bool least) const
+{
+    std::vector<Point> points;
+    double column = -1;
+    for (const Moment& moment : moments) {
+        const double value = valueOf(moment), at = std::floor(moment.time * perSecond);
+        if (!std::isfinite(value))
+            continue;
+        if (at != column)
+            points.push_back({moment.time, value});
+        else if (least ? value < points.back().value : value > points.back().value)
+            points.back() = {moment.time, value};
+        column = at;
+    }
+    return points;
+}
+
 void drawForceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery, const History& history)
 {
     const double cap = std::max(scenery.forceCap, 0.1);
@@ -182,7 +191,7 @@ void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const cha
     for (const std::size_t s : order)
         curves.push_back({base::spokenHere(text(scenery.structure[s])), s == 0 ? good : colours[s % colours.size()],
                           s == 0 ? 2.5 : 1.5,
-                          [s](const History::Moment& m) { return 1e3 * static_cast<double>(m.distance[s]); }});
+                          [s](const History::Moment& m) { return 1e3 * static_cast<double>(m.distance[s]); }, true});
     drawAll(d, area, history, curves);
 }
 

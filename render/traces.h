@@ -7,6 +7,8 @@
 
 #include <array>
 #include <deque>
+#include <functional>
+#include <vector>
 
 namespace palpate::render {
 
@@ -20,6 +22,13 @@ struct History {
     std::deque<Moment> moments;  // of the last traceSeconds
     std::deque<Event> events;    // the last ones, oldest first
 
+    struct Point {
+        double time = 0;  // [s]
+        double value = 0;
+    };
+
+    /// A value of the moments over time, at most one for each of `perSecond` columns: the largest there, or the least.
+    std::vector<Point> columns(double perSecond, const std::function<double(const Moment&)>& valueOf, bool least) const;
     /// Takes a state in; what is later than it is forgotten, as after a jump in a record.
     void add(const channel::State& state);
 

@@ -343,11 +343,11 @@ void UltrasoundPicture::endCaliper()
 }
 
 // The session and the tick in its name: no picture takes the place of another.
-void UltrasoundPicture::store(const std::filesystem::path& folder)
+bool UltrasoundPicture::store(const std::filesystem::path& folder)
 {
     const ScanThread::Image image = shown();
     if (!image)
-        return;
+        return false;
     constexpr int width = 800, height = 600;
     ultrasound::BeamImage stored = *image;
     stored.mirrored = mirrored_;
@@ -360,9 +360,11 @@ void UltrasoundPicture::store(const std::filesystem::path& folder)
         base::writeWhole(file, ultrasound::storedImage(stored, width, height));
         message_ = base::said(base::tr("stored {}"),
                               folder == "." ? file.filename().string() : (folder.filename() / file.filename()).string());
+        return true;
     } catch (const std::exception& e) {
         message_ = e.what();
     }
+    return false;
 }
 
 }  // namespace palpate::render

@@ -58,8 +58,8 @@ public:
     void dragCaliper(Point2 pixel);
     void endCaliper();
     void clearCalipers() { calipers_.clear(); }
-    /// Writes the picture beside those before into `folder`.
-    void store(const std::filesystem::path& folder);
+    /// Writes the picture beside those before into `folder`. False where there is none, or it cannot be written.
+    bool store(const std::filesystem::path& folder);
 
     std::optional<ScanFigures> figures() const { return scan_ ? std::optional(scan_->figures()) : std::nullopt; }
 

@@ -60,6 +60,7 @@ struct ViewerOptions {
     bool steps = true;                     // the step that one is at and what is wrong, in words (windows only)
     double tryout = 0;                     // of so many seconds: what the hand does, in words; 0: no tryout
     std::filesystem::path result;          // figures of the session, once it has ended: shown in its window
+    bool watches = false;                  // only: never becomes the hand of a session
     bool hidden = false;                   // the window is on a display of its own that nobody sees, for measurements
     Layout layout = Layout::trainee;       // to begin with
     SliceLook slices = SliceLook::tinted;  // to begin with, where there is an image

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <glm/gtx/component_wise.hpp>
+
 #include <algorithm>
 #include <array>
 
@@ -38,17 +40,24 @@ Frame frameOf(const ReportData& d, const std::optional<haptics::TargetShape>& ta
         low = glm::min(low, p - radius);
         high = glm::max(high, p + radius);
     };
-    for (const PathPoint& p : d.path) {
-        take(p.tip, 0);
-    }
     for (const Core& core : d.cores) {
         take(core.sample.notchEnd * 1e3, 0);
     }
     if (target) {
         take(target->middle * 1e3, target->diameter * 500);
     }
-    const Vec3 size = high - low;
-    return {0.5 * (low + high), std::min(tallest, std::max({size.x, size.y, size.z}) + 2 * margin)};
+    for (const PathPoint& p : d.path) {
+        p.inside ? take(p.tip, 0) : void();
+    }
+    const auto middle = [&] { return 0.5 * (low + high); };
+    const auto extent = [&] { return glm::compMax(high - low) + 2 * margin; };
+    const Frame tissue{middle(), extent()};
+    for (const PathPoint& p : d.path) {
+        take(p.tip, 0);
+    }
+    // Where not all has room, what lies in the body has.
+    const bool isCut = extent() > tallest && tissue.extent > 0;
+    return {isCut ? tissue.middle : middle(), std::min(tallest, extent())};
 }
 
 class Drawing {

@@ -108,8 +108,7 @@ struct Errands::Impl {
             state.notice = aboutProfiles(state.notice);
             return;  // who was there stays
         }
-        state.people = peopleOf(answer);
-        state.person = chosenPerson(state) == nullptr ? "" : state.person;
+        peopleListed(state, peopleOf(answer));
     }
     // What there was stays where the command fails.
     void listCases(State& state)
@@ -194,9 +193,14 @@ struct Errands::Impl {
     void seeKept(State& state) { watch(state, "--replay"); }
     void watch(State& state, const char* what)
     {
-        const std::vector<std::string> words{
-            what,        state.instructor.watched, titleOption(state.instructor.watchedTitle), "--layout", "instructor",
-            "--palette", state.settings.palette};
+        const std::vector<std::string> words{what,
+                                             state.instructor.watched,
+                                             titleOption(state.instructor.watchedTitle),
+                                             "--watch",
+                                             "--layout",
+                                             "instructor",
+                                             "--palette",
+                                             state.settings.palette};
         eyes.emplace_back(programs / "palpate-view", words, scratch / ("watch-" + std::to_string(++watched) + ".log"));
         state.notice = opening();
     }

@@ -84,7 +84,7 @@ void fillInstructor(std::mt19937& random, State& state)
     Instructor& i = state.instructor;
     for (std::size_t n = 0; n < people; ++n) {
         state.people.push_back({fmt::format("Resident {}", n + 1), n % 5 == 0});
-        i.groupOf.push_back(static_cast<int>(n % 3));
+        putIntoGroup(state, state.people.back().name, static_cast<int>(n % 3));
     }
     for (int n = 0; n < 5; ++n) {
         LiveSession live;

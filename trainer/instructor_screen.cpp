@@ -179,25 +179,27 @@ Errand drawSessions(State& state)
 
 void drawMembers(State& state)
 {
-    Instructor& i = state.instructor;
-    i.groupOf.resize(state.people.size(), 0);
     for (std::size_t n = 0; n < state.people.size(); ++n) {
+        const std::string& name = state.people[n].name;
+        const auto& groups = state.instructor.groups;
+        const auto of = groups.find(name);
+        const int now = of != groups.end() ? of->second : 0;
         ImGui::PushID(static_cast<int>(n));
-        rollsAsOne() ? words(state.people[n].name) : void();
+        rollsAsOne() ? words(name) : void();
         for (int group = 0; group <= 2; ++group) {
             const std::string label = group == 0 ? tr("in none") : said(tr("group {}"), group);
             group == 0 ? void() : besideIfRoom(label + "    ");
             const Rgb mark = groupColour(static_cast<std::size_t>(std::max(group, 1) - 1));
             ImGui::PushStyleColor(ImGuiCol_CheckMark,
                                   group == 0 ? ImGui::GetStyle().Colors[ImGuiCol_CheckMark] : vec(mark));
-            if (ImGui::RadioButton(label.c_str(), i.groupOf[n] == group)) {
-                putIntoGroup(state, n, group);
+            if (ImGui::RadioButton(label.c_str(), now == group)) {
+                putIntoGroup(state, name, group);
             }
             ImGui::PopStyleColor();
         }
         if (!rollsAsOne()) {
             ImGui::SameLine();
-            ImGui::TextUnformatted(drawable(state.people[n].name).c_str());
+            ImGui::TextUnformatted(drawable(name).c_str());
         }
         ImGui::PopID();
     }

@@ -279,10 +279,22 @@ void noteKept(State& state)
     noteTyped(state);
 }
 
+void peopleListed(State& state, std::vector<PersonEntry> people)
+{
+    state.people = std::move(people);
+    state.person = chosenPerson(state) == nullptr ? "" : state.person;
+    Instructor& i = state.instructor;
+    const auto isGone = [&](const auto& member) {
+        return std::ranges::find(state.people, member.first, &PersonEntry::name) == state.people.end();
+    };
+    if (std::erase_if(i.groups, isGone) > 0) {
+        i.comparison = {};
+    }
+}
+
 void everybodyLoaded(State& state, Progress everybody)
 {
     Instructor& i = state.instructor;
-    i.groupOf.resize(state.people.size(), 0);
     std::ranges::stable_sort(everybody.sessions, std::greater(), &KeptSession::started);
     const auto before = std::exchange(i.everybody, std::move(everybody)).sessions;
     const auto& sessions = i.everybody.sessions;
@@ -299,13 +311,16 @@ bool hasDraft(const Instructor& instructor, const KeptSession& session)
     return instructor.drafts.contains({session.name, session.number});
 }
 
-void putIntoGroup(State& state, std::size_t person, int group)
+void putIntoGroup(State& state, const std::string& person, int group)
 {
     Instructor& i = state.instructor;
-    i.groupOf.resize(state.people.size(), 0);
-    if (std::exchange(i.groupOf.at(person), group) != group) {
-        i.comparison = {};
+    const auto before = i.groups.find(person);
+    if ((before != i.groups.end() ? before->second : 0) == group) {
+        return;
     }
+    i.comparison = {};
+    i.groups[person] = group;
+    std::erase_if(i.groups, [](const auto& member) { return member.second == 0; });
 }
 
 void compareCase(State& state, const std::string& caseId)
@@ -356,19 +371,17 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
 std::vector<std::string> comparisonArguments(const State& state)
 {
     Words words{{"progress"}};
-    const Instructor& of = state.instructor;
     for (int group = 1; group <= 2; ++group) {
         const std::size_t before = words.size();
-        for (std::size_t i = 0; i < std::min(of.groupOf.size(), state.people.size()); ++i) {
-            if (of.groupOf[i] == group) {  // one by one: a name may have a comma
-                words.add(true, {"--group", said(tr("group {}"), group) + "=" + state.people[i].name});
-            }
+        for (const auto& [name, of] : state.instructor.groups) {
+            words.add(of == group,
+                      {"--group", said(tr("group {}"), group) + "=" + name});  // one by one: a name may have a comma
         }
         if (words.size() == before) {
             return {};
         }
     }
-    words.add(!of.caseId.empty(), {"--case", of.caseId});
+    words.add(!state.instructor.caseId.empty(), {"--case", state.instructor.caseId});
     return words;
 }
 

@@ -73,9 +73,9 @@ struct Instructor {
     int rating = 0;          // 1 to 5; 0: none
     // Notes and ratings that were typed and not kept yet, by name and number of their session.
     std::map<std::pair<std::string, std::int64_t>, std::pair<std::string, int>> drafts;
-    std::vector<int> groupOf;  // by profile, as in State::people: 0 in none, 1 or 2
-    std::string caseId;        // only sessions of this case are compared; empty: all
-    bool asPage = false;       // the comparison is wanted as a page, too
+    std::map<std::string, int> groups;  // 1 or 2, by name; who is in none is not in it
+    std::string caseId;                 // only sessions of this case are compared; empty: all
+    bool asPage = false;                // the comparison is wanted as a page, too
     Comparison comparison;
 };
 
@@ -167,12 +167,15 @@ void noteTyped(State& state);
 /// Instructor's screen: note and rating of the chosen session, as they were typed, are kept.
 /// @pre  there is one
 void noteKept(State& state);
+/// What `palpate profile list` has said. Whoever is in a group and has no profile any more leaves it, and a comparison
+/// goes.
+void peopleListed(State& state, std::vector<PersonEntry> people);
 /// What `palpate progress --all` has learnt, the newest session first. The chosen session stays chosen.
 void everybodyLoaded(State& state, Progress everybody);
 /// Whether something that was typed for this session is not kept yet.
 bool hasDraft(const Instructor& instructor, const KeptSession& session);
 /// Instructor's screen: a person goes into a group (1 or 2), or into none (0). A comparison of other groups goes.
-void putIntoGroup(State& state, std::size_t person, int group);
+void putIntoGroup(State& state, const std::string& person, int group);
 /// Instructor's screen: only sessions of this case are compared; empty: all. A comparison of others goes.
 void compareCase(State& state, const std::string& caseId);
 /// What `palpate progress` has learnt of the person.

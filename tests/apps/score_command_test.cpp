@@ -186,6 +186,7 @@ TEST(ScoreCommand, WrongRequestsAreToldOnOneLine)
              {"--group", "name"},
              {"--group", "=" + a},
              {"--group", "name=" + a + ",," + a},
+             {a, "--pictures", folder.path().string()},
              {a, session(folder, "b", 0.01, 1), "--report", (folder / "r.html").string()}}) {
         try {
             score(arguments);

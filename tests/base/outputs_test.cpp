@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -66,6 +69,34 @@ TEST(Outputs, ALinkToItselfIsRefusedAndStays)
     EXPECT_THROW(checkOutput(one), std::runtime_error);
     EXPECT_THROW(writeWhole(one, "x"), std::runtime_error);
     EXPECT_TRUE(fs::is_symlink(one));
+}
+
+// A file is written beside its place and moved there: that it may be written itself is not enough. It is told before the
+// work, and not after. Without root's rights, who may write everywhere.
+TEST(Outputs, AFileInAFolderThatMayNotBeWrittenIsRefusedAtOnce)
+{
+    const tests::Folder folder;
+    const std::string file = folder / "there.csv";
+    writeWhole(file, "x");
+    fs::permissions(file, fs::perms::all);
+    fs::permissions(folder.path(),
+                    fs::perms::owner_read | fs::perms::owner_exec | fs::perms::others_read | fs::perms::others_exec);
+    const auto asNobody = [&] {
+        constexpr unsigned nobody = 65534;
+        if (::getuid() == 0 && ::setuid(nobody) != 0) {
+            std::exit(2);
+        }
+        try {
+            checkOutput(file);
+        } catch (const std::runtime_error& e) {
+            std::fputs(e.what(), stderr);
+            std::exit(1);
+        }
+        std::exit(0);
+    };
+    EXPECT_EXIT(asNobody(), ::testing::ExitedWithCode(1), "cannot be written .Permission denied.");
+    fs::permissions(folder.path(), fs::perms::owner_all);
+    EXPECT_NO_THROW(checkOutput(file));
 }
 
 // Also by another path to it, and through a link; a device may be both, and a file that is not there is no file that is

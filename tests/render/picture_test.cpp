@@ -354,7 +354,7 @@ TEST_F(PictureTest, ARecordsEventsAndScansAreOfTheirOwnTime)
     taken.tick = 600;
     taken.pictures = 1;
     recorded.add({0.5, EventKind::contact, 0, 0});
-    recorded.add(taken, {});
+    recorded.addTaken(taken, {});
     Picture& picture = studio->picture();
     picture.setRecorded(&recorded);
     picture.open(scenery, studio->labels, "story");

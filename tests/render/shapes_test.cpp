@@ -196,6 +196,32 @@ TEST(History, KeepsPeaksThatNoPictureShows)
     EXPECT_GE(history.moments.front().time, history.moments.back().time - traceSeconds - 0.1);
 }
 
+// A window may be so narrow that several moments share a pixel column, and moves on by fractions of one.
+TEST(History, EveryPeakIsInItsColumn)
+{
+    for (int peak = 0; peak < 100; ++peak) {
+        History history;
+        channel::State state;
+        for (state.tick = 0; state.tick < 2000; ++state.tick) {
+            state.time = 1e-3 * static_cast<double>(state.tick);
+            const bool isPeak = static_cast<int>(state.tick / 20) == peak;
+            state.total = {isPeak ? 3.0 : 1.0, 0, 0};
+            state.distance[0] = isPeak ? 0.002 : 0.010;
+            history.add(state);
+        }
+        const auto force = history.columns(
+            13.0, [](const auto& m) { return m.total; }, false);
+        const auto distance = history.columns(
+            13.0, [](const auto& m) { return static_cast<double>(m.distance[0]); }, true);
+        ASSERT_EQ(force.size(), 26U);
+        const auto larger = [](const History::Point& a, const History::Point& b) { return a.value < b.value; };
+        const History::Point most = *std::ranges::max_element(force, larger);
+        EXPECT_DOUBLE_EQ(most.value, 3.0);
+        EXPECT_NEAR(most.time, 0.02 * peak, 0.021);
+        EXPECT_NEAR(std::ranges::min_element(distance, larger)->value, 0.002, 1e-9) << peak;
+    }
+}
+
 TEST(History, ForgetsWhatIsLaterThanAJumpBack)
 {
     const channel::Scenery scenery = bodyScenery();

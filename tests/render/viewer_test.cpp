@@ -394,6 +394,36 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
 }
 
+// An instructor looks at a session in which the mouse is the hand before the trainee's window is there, or while that is
+// opened again.
+TEST_F(Viewer, ThatOnlyWatchesLeavesTheHand)
+{
+    channel::Scenery scenery = render::bodyScenery(52, 2e-3);
+    scenery.viewersHand = channel::handIsViewers;
+    channel::Publisher publisher(session_, scenery, render::bodyLabels(scenery));
+    publisher.setState(render::storyState(scenery, 1.5));
+    const auto subscriber = channel::Subscriber::attach(session_);
+    ASSERT_TRUE(subscriber);
+    const auto takesTheHand = [&](const std::vector<std::string>& more, const std::string& name) {
+        std::vector<std::string> options{"--size", "400x400", "--frames", "6", "--json", folder_ / (name + ".json")};
+        options.insert(options.end(), more.begin(), more.end());
+        Process viewer(window("-screen 0 800x600x24", options), log(name));
+        bool taken = false;
+        channel::State state = render::storyState(scenery, 1.5);
+        for (int i = 0; i < 1500 && !fs::exists(folder_ / (name + ".json")); ++i) {
+            state.time = 0.02 * static_cast<double>(++state.tick);
+            publisher.setState(state);
+            taken = taken || !channel::ViewersHand::take(*subscriber);
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        }
+        viewer.wait();
+        EXPECT_TRUE(fs::exists(folder_ / (name + ".json"))) << said(name);
+        return taken;
+    };
+    EXPECT_TRUE(takesTheHand({}, "hand"));
+    EXPECT_FALSE(takesTheHand({"--watch"}, "watcher"));
+}
+
 // A server may be asked to end before it listens (a test with Debian's Xvfb waited 600 s for it, which is a timer of it).
 TEST_F(Viewer, EndsThoughItsServerDoesNot)
 {

@@ -2,6 +2,7 @@
 #include <report/data.h>
 #include <report/groups.h>
 #include <report/html.h>
+#include <report/path.h>
 #include <report/report.h>
 
 #include <tests/haptics/synthetic_session.h>
@@ -96,6 +97,55 @@ TEST(ReportData, ProfileSeparatesGoingInFromComingOut)
         EXPECT_NEAR(p.out[i], 0.05 * p.depth[i], 0.002);
         EXPECT_NEAR(p.peak[i], 0.1 * (p.depth[i] + 0.25), 0.002);
     }
+}
+
+// The tip of a bent needle is where its notch is, and not where the hand would have it.
+TEST(ReportData, ThePathIsTheTips)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(100);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        ticks[n].phase = haptics::Phase::inserted;
+        ticks[n].device.position = {0, 1e-3 * static_cast<double>(n), 0};
+        ticks[n].deflection = {0, 0, 3e-5 * static_cast<double>(n)};
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    const Record record(folder / "a");
+    const ReportData data = collect(record);
+    for (const PathPoint& p : data.path) {
+        EXPECT_NEAR(p.tip.z, 0.03 * p.tip.y, 1e-9);
+    }
+    EXPECT_NEAR(data.score.insertedPath, 99e-3 * std::hypot(1, 0.03), 1e-6);
+}
+
+// Somebody who draws the tool far out of the body has a picture of the body nevertheless.
+TEST(PathCard, ShowsTheBodyHoweverFarThePathGoes)
+{
+    ReportData data;
+    for (int n = 0; n <= 100; ++n) {
+        data.path.push_back({Vec3(0, -5.0 * (100 - n), 0), false});
+    }
+    for (int n = 0; n <= 40; ++n) {
+        data.path.push_back({Vec3(0, n, 0), true});
+    }
+    data.entries.push_back(Vec3(0.0));
+    const std::string card = pathCard(data, synthetic::info());
+    std::size_t at = 0;
+    int entries = 0;
+    for (; (at = card.find("<circle cx=\"", at)) != std::string::npos; ++at) {
+        const std::string circle = card.substr(at, card.find("/>", at) - at);
+        if (circle.find("#b07040") == std::string::npos) {
+            continue;
+        }
+        ++entries;
+        for (const char* axis : {"cx=\"", "cy=\""}) {
+            const double pixel = std::stod(circle.substr(circle.find(axis) + 4));
+            EXPECT_GT(pixel, 0) << circle;
+            EXPECT_LT(pixel, 300) << circle;
+        }
+    }
+    EXPECT_EQ(entries, 3);
 }
 
 // Task k takes k + 1 us in every tick but each 50th, in which it takes ten times that: p50 and p99 are those two.

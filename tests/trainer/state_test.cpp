@@ -105,13 +105,13 @@ TEST(State, AComparisonGoesWhenOtherGroupsOrCasesAreChosen)
     state.people = {{"Ada", false}, {"Bo", false}};
     const Comparison some{{"group 1", "group 2"}, {1, 1}, {}, {}};
     Instructor& i = state.instructor;
-    putIntoGroup(state, 0, 1);
+    putIntoGroup(state, "Ada", 1);
     i.comparison = some;
-    putIntoGroup(state, 0, 1);
+    putIntoGroup(state, "Ada", 1);
     EXPECT_EQ(i.comparison.names.size(), 2U) << "nothing has changed";
-    putIntoGroup(state, 1, 1);
+    putIntoGroup(state, "Bo", 1);
     EXPECT_TRUE(i.comparison.names.empty());
-    EXPECT_EQ(i.groupOf, (std::vector<int>{1, 1}));
+    EXPECT_EQ(i.groups, (std::map<std::string, int>{{"Ada", 1}, {"Bo", 1}}));
     i.comparison = some;
     compareCase(state, "");
     EXPECT_EQ(i.comparison.names.size(), 2U);
@@ -247,13 +247,33 @@ TEST(State, GroupsAreCompared)
 {
     State state = firstState();
     state.people = {{"Ada", false}, {"Bert", false}, {"Carla", false}};
-    state.instructor.groupOf = {1, 1, 0};
+    state.instructor.groups = {{"Ada", 1}, {"Bert", 1}};
     EXPECT_TRUE(comparisonArguments(state).empty()) << "nobody in the second group";
-    state.instructor.groupOf[2] = 2;
+    putIntoGroup(state, "Carla", 2);
     state.instructor.caseId = "first";
     EXPECT_EQ(comparisonArguments(state),
               (std::vector<std::string>{"progress", "--group", "group 1=Ada", "--group", "group 1=Bert", "--group",
                                         "group 2=Carla", "--case", "first"}));
+}
+
+// Profiles are listed by name: who comes later may stand before others.
+TEST(State, GroupsStayWithTheirPeople)
+{
+    State state = firstState();
+    peopleListed(state, {{"Bert", false}, {"Carla", false}});
+    putIntoGroup(state, "Bert", 1);
+    putIntoGroup(state, "Carla", 2);
+    Comparison& comparison = state.instructor.comparison;
+    comparison = {{"group 1", "group 2"}, {1, 1}, {}, {}};
+    const auto asked = comparisonArguments(state);
+    peopleListed(state, {{"Anna", false}, {"Bert", false}, {"Carla", false}});
+    EXPECT_EQ(comparisonArguments(state), asked);
+    EXPECT_EQ(comparison.names.size(), 2U) << "it is of the same people";
+    peopleListed(state, {{"Anna", false}, {"Carla", false}});
+    EXPECT_TRUE(comparisonArguments(state).empty()) << "nobody in the first group";
+    EXPECT_TRUE(comparison.names.empty());
+    putIntoGroup(state, "Carla", 0);
+    EXPECT_TRUE(state.instructor.groups.empty());
 }
 
 TEST(State, TheCommandIsWhatAShellUnderstands)
