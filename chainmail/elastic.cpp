@@ -74,6 +74,7 @@ void Elastic::settle() noexcept
         held.forgetContacts();
         held.blend.forget();
     }
+    givenFor_ = 0;
     if (atRest_) {
         return;
     }
@@ -86,7 +87,6 @@ void Elastic::settle() noexcept
         }
         since_ = {};
         historyEnergy_ = 0.0;
-        givenFor_ = 0;
     }
     energy_ = 0.0;
     toolAt_.clear();

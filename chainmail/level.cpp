@@ -152,7 +152,9 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
         const Vec3 at = glm::mix(grip.proxy, grip.entry, back / inserted);
         const Vec3 way = grip.position - back * grip.axis - at;
         const double held = tieStiffnessAt(elastic_.body(), at);
-        ties_[count++] = {at, way + (grip.drag - glm::dot(way, grip.axis)) * grip.axis, grip.axis, held, held};
+        const double carried =
+            grip.drag + glm::dot(glm::mix(grip.pushedAtTip, grip.pushedAtEntry, back / inserted), grip.axis);
+        ties_[count++] = {at, way + (carried - glm::dot(way, grip.axis)) * grip.axis, grip.axis, held, held};
     }
     return {{}, std::span(ties_).first(count), focusAt(surface_, grip.proxy)};
 }

@@ -28,7 +28,8 @@ struct Grip {
     Vec3 entry{0.0};             // where the shaft went in, at rest [m]
     Vec3 axis{0, 1, 0};          // along the tool, towards its tip
     double drag = 0;             // how far a shaft carries the tissue around it along `axis` [m]
-    double friction = 0;         // of a tool that presses (Coulomb) [-]
+    Vec3 pushedAtTip{0.0}, pushedAtEntry{0.0};  // by others, where the shaft is [m]
+    double friction = 0;                        // of a tool that presses (Coulomb) [-]
     std::span<const ElasticTool> others;  // tools that press besides, ElasticLevel::maxOthers at most; only level elastic
                                           // knows them. They must live until the next call
 };

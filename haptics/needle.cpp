@@ -81,6 +81,7 @@ struct Needle {
     {
         tip.proxy += way * tool.axis;
         tip.tissue = tissueFor(tip.proxy);
+        state.wentThrough = state.wentThrough || tip.tissue == 0;
         state.lobe = way != 0.0 ? lobeOf(model, tip.tissue, tip.proxy) : state.lobe;
     }
 

@@ -335,12 +335,12 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
     }
     // No tip is farther beyond the target than from it.
     double beyond = std::min(record.inserted - atTarget_, distance);
-    if (record.fired) {
-        shot_.emplace(record.device.position, beyond);
-    }
     // The tissue lets go of the shaft, which slides on while the hand stands.
     if (shot_) {
         beyond = std::min(beyond, std::max(0.0, shot_->second) + glm::distance(record.device.position, shot_->first));
+    }
+    if (record.fired) {
+        shot_.emplace(record.device.position, beyond);
     }
     score_.beyondTarget = std::max(score_.beyondTarget, beyond);
 }
@@ -405,6 +405,7 @@ void Scorer::addPicture(const TickRecord& record) noexcept
     }
     if (record.phase != Phase::inserted) {
         reached_ = 0;
+        isDrawnBack_ = false;
         return;
     }
     ++insideTicks_;
@@ -416,8 +417,10 @@ void Scorer::addPicture(const TickRecord& record) noexcept
         score_.blindAdvance += record.tipInBeam ? 0.0 : further;
         minInBeam_ = record.inserted > wellInside ? std::min(minInBeam_, record.needleInBeam) : minInBeam_;
         reached_ = record.inserted;
-    } else if (record.inserted < reached_ - redirectLength) {
-        reached_ = record.inserted;  // drawn back: what follows is another way in
+        isDrawnBack_ = false;
+    } else if (isDrawnBack_ || record.inserted < reached_ - redirectLength) {
+        reached_ = record.inserted;  // what follows is another way in
+        isDrawnBack_ = true;
     }
 }
 

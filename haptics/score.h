@@ -189,6 +189,7 @@ private:
     // Ultrasound: sums over the ticks inside, and the depth that the needle has been to in this way in.
     std::uint64_t probeTicks_ = 0, insideTicks_ = 0, tipTicks_ = 0;
     double inBeamSum_ = 0, shareSum_ = 0, minInBeam_ = std::numeric_limits<double>::infinity(), reached_ = 0;
+    bool isDrawnBack_ = false;  // by so much that what follows is another way in
     PressedButton picture_{buttonPicture};
     std::array<Vec3, maxMarks> marks_{};  // [m]
     PressedButton mark_{buttonMark}, unmark_{buttonUnmark};

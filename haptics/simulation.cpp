@@ -262,6 +262,8 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.axis = tool_.axis;
     grip.shape = {tip, tip - tool.pressedLength() * tool_.axis, tool.radius, tool.radius};
     grip.deepest = tip_.place - tip_.proxy;
+    grip.pushedAtTip = tip_.pushed.at(tip_.needle.inserted);
+    grip.pushedAtEntry = tip_.pushed.at(0.0);
     return grip;
 }
 
@@ -285,6 +287,7 @@ chainmail::Reaction Simulation::deform() noexcept
         record_.penetration = reaction.depth;
     }
     record_.probeForce = reaction.othersForce;
+    tip_.others = glm::length(reaction.othersForce);
     return reaction;
 }
 
@@ -296,7 +299,7 @@ Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) con
     if (tip_.phase == Phase::free || !reaction.force) {
         return law;
     }
-    const double depth = glm::distance(tool_.position, tip_.proxy);
+    const double depth = glm::distance(tool_.position - tip_.pushed.at(0.0), tip_.proxy);
     const Vec3 least = depth > 0.0 ? std::min(reaction.behind / depth, 1.0) * law : Vec3(0.0);
     return glm::length(*reaction.force) >= glm::length(least) ? *reaction.force : least;
 }
@@ -314,9 +317,11 @@ void Simulation::placeProbe() noexcept
 void Simulation::seeNeedle() noexcept
 {
     if (tip_.phase == Phase::inserted) {
-        const auto seen = probe_.look(tool_.position, tool_.axis, tip_.needle.inserted, model_.scene.tool.radius);
+        // What is in air is so at the tip, where the needle has gone through.
+        const Vec3 end = tool_.position - tip_.needle.through * tool_.axis;
+        const auto seen = probe_.look(end, tool_.axis, tip_.needle.inTissue(), model_.scene.tool.radius);
         record_.needleInBeam = seen.length;
-        record_.tipInBeam = seen.tip;
+        record_.tipInBeam = seen.tip && tip_.tissue != 0;
     }
 }
 

@@ -16,6 +16,13 @@ namespace {
 constexpr double tipFriction = 2.0;
 constexpr double mouth = 1e-3;  // a path that is open this deep is one to go in by [m]
 
+// Where a tool would be if others had displaced nothing at its tip.
+DeviceSample inTissue(DeviceSample tool, Vec3 pushed) noexcept
+{
+    tool.position -= pushed;
+    return tool;
+}
+
 struct Tip {
     const SessionModel& model;
     const volume::Tissue::Reader& reader;
@@ -48,6 +55,7 @@ struct Tip {
         state.phase = Phase::contact;
         const Vec3 front = occupancy::restPoint(body, way.point) + (way.front - way.point);
         take(touching(model.surface, proxyTool(), front));
+        state.pushed.look(body, state.place - offset() * state.normal, device.axis, state.others);
         const auto touched = tissueTouched(state.place - offset() * state.normal);
         addEvent(record, {EventKind::contact, 0xFF, touched, glm::distance(way.front, device.position)});
     }
@@ -83,13 +91,14 @@ struct Tip {
     Vec3 press() noexcept
     {
         SurfaceProxy proxy{state.proxy, state.normal, state.place};
-        slip(model.surface, proxyTool(), device.position, proxy);
+        const DeviceSample tool = inTissue(device, state.pushed.at(0.0));
+        slip(model.surface, proxyTool(), tool.position, proxy);
         take(proxy);
-        if (depthUnder(proxy, device.position) <= 0.0) {
+        if (depthUnder(proxy, tool.position) <= 0.0) {
             release();
             return Vec3(0.0);
         }
-        const Vec3 away = device.position - state.proxy;
+        const Vec3 away = tool.position - state.proxy;
         const Vec3 under = state.place - offset() * state.normal;
         const auto local = tissueUnder(model, reader, under, -state.normal, model.scene.tool.radius);
         const double way = glm::length(away);
@@ -104,7 +113,7 @@ struct Tip {
         }
         const bool open = opensHere();
         if (open || along >= row(state.tissue).punctureForce) {
-            enterNeedle(model, device, state);
+            enterNeedle(model, tool, state);
         }
         if (!open && state.phase == Phase::inserted) {
             addEvent(record, {EventKind::puncture, 0xFF, state.tissue, along});
@@ -121,6 +130,7 @@ Vec3 moveTip(const SessionModel& model, const volume::Tissue::Reader& reader, co
              const DeviceSample& tool, const occupancy::Sweep& way, double dt, TipState& state, TickRecord& record) noexcept
 {
     Tip tip{model, reader, body, tool, dt, state, record};
+    state.pushed.follow(state.others, dt);
     if (state.phase == Phase::free) {
         tip.seekContact(way);
     }
@@ -128,7 +138,7 @@ Vec3 moveTip(const SessionModel& model, const volume::Tissue::Reader& reader, co
     if (state.phase == Phase::contact) {
         force = tip.press();
     } else if (state.phase == Phase::inserted) {
-        force = moveNeedle(model, reader, tool, dt, state, record);
+        force = moveNeedle(model, reader, inTissue(tool, state.pushed.at(state.needle.inserted)), dt, state, record);
         if (state.needle.inserted < 0.0) {
             tip.release();
         }

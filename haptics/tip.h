@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/needle.h>
+#include <haptics/pushed_way.h>
 #include <haptics/session_model.h>
 #include <haptics/tick.h>
 #include <occupancy/query.h>
@@ -9,8 +10,8 @@ namespace palpate::haptics {
 
 /// How the tool's tip holds on to tissue. The proxy is the material point, at rest, that the tip has hold of: on the
 /// surface while it presses, inside while a needle cuts. The tissue there is displaced by tip - proxy, and the force is
-/// that of the depth law over the same way; the proxy gives way towards the tip only when the tissue fails (slips, is
-/// pierced, is cut), so that it only ever takes energy out.
+/// that of the depth law over the same way, but for what other tools displace; the proxy gives way towards the tip only
+/// when the tissue fails (slips, is pierced, is cut), so that it only ever takes energy out.
 struct TipState {
     Phase phase = Phase::free;
     Vec3 proxy{0.0};   // at rest; while free: the tip itself [m]
@@ -19,6 +20,8 @@ struct TipState {
     std::uint8_t tissue = 0;  // row at the proxy
     RelaxingForce lost;       // of the force while in contact
     NeedleState needle;       // while inserted; its cuts stay
+    double others = 0;        // size of the force of tools that press besides, in the tick before [N]
+    PushedWay pushed;         // by them, on the needle's way; of another tool, where it touches
 };
 
 /// One tick of the tip of a tool whose pose is `tool`; returns the basic force F_BFFB [N].

@@ -22,14 +22,16 @@ public:
     explicit Corners(const Body& body) noexcept : body_(body) {}
 
     // Trilinear over the elements that are there [m].
-    Vec3 displacement(Vec3 rest) noexcept
+    Vec3 displacement(Vec3 rest) noexcept { return displacement(rest, Vec3(0.0)); }
+    // The same, and `elsewhere` where there are none.
+    Vec3 displacement(Vec3 rest, Vec3 elsewhere) noexcept
     {
         const Vec3 g = (rest - body_.grid.origin) / body_.grid.spacing;
         const Index3 low(floorOf(g.x), floorOf(g.y), floorOf(g.z));
         if (!fetched_ || low != low_) {
             fetch(low);
         }
-        return between(g - Vec3(low));
+        return between(g - Vec3(low), elsewhere);
     }
 
 private:
@@ -49,7 +51,7 @@ private:
     }
 
     // Sums all four columns alike, in the order of the corners: what is not there adds zero.
-    Vec3 between(Vec3 t) const noexcept
+    Vec3 between(Vec3 t, Vec3 elsewhere) const noexcept
     {
         const std::array<double, 2> x{1.0 - t.x, t.x}, y{1.0 - t.y, t.y}, z{1.0 - t.z, t.z};
         std::array<double, 4> sum{};
@@ -59,7 +61,7 @@ private:
                 sum[i] += weight * values_[corner][i];
             }
         }
-        return sum[3] > 0.0 ? Vec3(sum[0], sum[1], sum[2]) / sum[3] : Vec3(0.0);
+        return sum[3] > 0.0 ? Vec3(sum[0], sum[1], sum[2]) / sum[3] : elsewhere;
     }
 
     const Body& body_;
@@ -75,6 +77,7 @@ struct Search {
         const double h = body.grid.spacing;
         Vec3 start = p;
         double nearest = 4.0 * h * h;
+        bool found = false;
         RestPositions restPosition(body.grid);
         body.map.visit(p - 0.5 * h, p + 0.5 * h, [&](Element e) {
             const Vec3 at = restPosition(e);
@@ -84,19 +87,32 @@ struct Search {
             if (square < nearest) {
                 nearest = square;
                 start = at + away;
+                shift = Vec3(body.u[e]);
+                found = true;
             }
         });
+        if (!found) {
+            // Where tissue would be at rest and is not, as in a dent: by as much as that has moved away.
+            shift = corners.displacement(p);
+            moved = shift != Vec3(0.0);
+            start = p - shift;
+        }
         rest = moved ? start : p;
     }
 
     // Half a step keeps the iteration a contraction for gradients of u up to 3.
     void step() noexcept { rest += 0.5 * miss(); }
 
-    // From where `rest` is seen to the point.
-    Vec3 miss() noexcept { return p - corners.displacement(rest) - rest; }
+    // From where `rest` is seen to the point. Off the tissue, space goes along with what is next to it.
+    Vec3 miss() noexcept
+    {
+        shift = corners.displacement(rest, shift);
+        return p - shift - rest;
+    }
 
     Vec3 p;
     Vec3 rest;
+    Vec3 shift{0.0};
     bool moved = false;
     Corners corners;
 };

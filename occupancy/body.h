@@ -53,8 +53,8 @@ private:
 Vec3 displacementAt(const Body& body, Vec3 rest) noexcept;
 
 /// The undeformed place of what is at `p` now [m]: solves X + u(X) = p by fixed-point steps, started at the nearest element
-/// that the occupancy map finds, so that displacements of many elements are followed. Outside tissue the displacement
-/// fades out with the elements, and X tends to p.
+/// that the occupancy map finds, so that displacements of many elements are followed. Off the tissue, as far as there are
+/// elements within about one of it, and in a dent, space is displaced as the tissue next to it; farther out X is p.
 Vec3 restPoint(const Body& body, Vec3 p) noexcept;
 
 /// As restPoint(), with as many steps as it takes (at most 60) until X + u(X) is within a thousandth of an element from

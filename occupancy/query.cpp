@@ -136,9 +136,16 @@ Gap gapDeformed(const Body& body, const Capsule& tool, const Surroundings& aroun
     return gap;
 }
 
+// Where tissue would be at rest and is not, as in a dent, nothing is in reach.
 Gap gapOf(const Body& body, const Capsule& tool, const Surroundings& around) noexcept
 {
-    return around.moved ? gapDeformed(body, tool, around) : gapAtRest(body, tool);
+    if (around.moved) {
+        return gapDeformed(body, tool, around);
+    }
+    Gap gap = gapAtRest(body, tool);
+    const bool isDent = gap.clear <= 0.0 && around.nearest == none && displacementAt(body, gap.point) != Vec3(0.0);
+    gap.clear = isDent ? 0.5 * body.grid.spacing : gap.clear;
+    return gap;
 }
 
 }  // namespace

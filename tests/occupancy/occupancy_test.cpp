@@ -304,6 +304,35 @@ TEST(Sweep, CannotTunnelThroughAPlateOfOneElement)
     }
 }
 
+// Another tool has pressed the skin in: a needle that comes down into the dent, in steps of a fiftieth of an element,
+// touches it where it is now, and not in the air where it was. So it does on its slopes, and beside it where the skin
+// bulges.
+TEST(Sweep, MeetsTheSkinOfADentWhereItIsNow)
+{
+    for (const double deep : {0.7, 1.5, 3.0, 6.0}) {
+        Solid s(40, [](Vec3 p) { return p.z - 30.3; });
+        const auto field = [&](Vec3 p) {
+            const double r = std::hypot(p.x - 19.5, p.y - 19.5) / 8.0;
+            return Vec3(
+                0, 0,
+                deep * (0.3 * std::exp(-(r - 1.8) * (r - 1.8) * 4.0) - std::exp(-r * r)) * std::exp((p.z - 30.3) / 12.0));
+        };
+        s.displace(field);
+        for (const double beside : {0.0, 2.2, 4.4, 7.1, 14.6}) {
+            const double x = 19.5 + beside, y = 19.8;
+            const double skin = 30.3 + field({x, y, 30.3}).z;
+            Vec3 last(x, y, 35.0);
+            double touched = 0.0;
+            for (double z = 35.0; z > 15.0 && touched == 0.0; z -= 0.02) {
+                const Vec3 now(x, y, z);
+                touched = sweep(s.body(), {last, last, 0.0}, {now, now, 0.0}).hit ? z : 0.0;
+                last = now;
+            }
+            EXPECT_NEAR(touched, skin, 0.25) << deep << " elements deep, " << beside << " beside its middle";
+        }
+    }
+}
+
 // A jump too long for the work allowed ends short of its goal instead of passing through what lies behind.
 TEST(Sweep, EndsWhereItsWorkEnds)
 {
