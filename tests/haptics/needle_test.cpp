@@ -1,5 +1,6 @@
 #include "slabs.h"
 
+#include <haptics/biopsy.h>
 #include <haptics/needle.h>
 #include <haptics/simulation.h>
 
@@ -125,6 +126,24 @@ TEST(Needle, BeyondTheFarSideOnlyTheShaftIsHeld)
     EXPECT_EQ(punctures, 2);
     EXPECT_EQ(needle.tip.tissue, *model.tissue->table().find("fat"));
     EXPECT_NEAR(needle.tip.needle.inTissue(), needle.tip.proxy.y, 0.3e-3);
+}
+
+// The gun opens the way out of the body; a needle that is pushed on there is in air, as one that has cut its way.
+TEST(Needle, OutByAWayThatTheGunHasOpenedItIsInAir)
+{
+    const auto model = tests::boxOf([](Vec3 p) { return std::string(p.x > 20e-3   ? "bone"
+                                                                    : p.y < 20e-3 ? "fat"
+                                                                                  : "air"); },
+                                    "bone", tests::chainmailOnly);
+    LoneNeedle needle(model);
+    constexpr double speed = 20e-3;
+    needle.go({0, -2e-3, 0}, {0, 14e-3, 0}, speed, [](Vec3, Vec3) {});
+    const auto core = takeCore(model, needle.reader, needle.body, {}, {0, 14e-3, 0}, {0, 1, 0});
+    removeCore(model, needle.body, core, {0, 14e-3, 0}, needle.tip.needle.cuts);
+    needle.go({0, 14e-3, 0}, {0, 32e-3, 0}, speed, [](Vec3, Vec3) {});
+    EXPECT_EQ(needle.tip.tissue, 0);
+    EXPECT_NEAR(needle.tip.needle.inserted, 32e-3, 0.5e-3);
+    EXPECT_NEAR(needle.tip.needle.inTissue(), 20e-3, 0.6e-3);
 }
 
 // A needle that turns about its resting tip is as deep as before, and nothing pulls at its shaft. The tip's own push turns

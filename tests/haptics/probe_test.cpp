@@ -484,6 +484,30 @@ TEST(Probe, MeasuresFollowFromWhatThePictureHad)
     EXPECT_EQ(s.picturesAfter, 1U);
 }
 
+// In by 40 mm, slowly back to 20 and in again, never seen: all of both ways in is blind.
+TEST(Probe, AWayInThatBeginsAnewIsBlindFromWhereItBegins)
+{
+    SessionInfo info = synthetic::info();
+    info.probe = true;
+    Scorer scorer(info);
+    TickRecord r;
+    r.phase = Phase::inserted;
+    const auto push = [&](double from, double to) {
+        for (int i = 1; i <= 1000; ++i) {
+            r.inserted = from + (to - from) * i / 1000;
+            scorer.add(r);
+            ++r.tick;
+        }
+    };
+    push(0, 40e-3);
+    push(40e-3, 20.1e-3);
+    push(20.1e-3, 40e-3);
+    EXPECT_NEAR(scorer.score().blindAdvance, 59.9e-3, 1e-9);
+    push(40e-3, 36e-3);
+    push(36e-3, 40e-3);
+    EXPECT_NEAR(scorer.score().blindAdvance, 59.9e-3, 1e-9) << "a hand that goes back and forth is no other way in";
+}
+
 // The better the skill, the more of the needle stays in the picture; over seeds.
 TEST(Probe, WhoKnowsHowKeepsTheNeedleInThePicture)
 {

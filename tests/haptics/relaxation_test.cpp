@@ -9,6 +9,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -101,6 +102,48 @@ TEST(RelaxingTissue, AStepDownTakesTheHistoryAlong)
     const auto force = forces(block(true), samples);
     for (std::size_t i = asked + 30; i < samples.size(); ++i) {
         ASSERT_NEAR(force[i], force[asked - 1], 0.1 * force[asked - 1]) << i - asked;
+    }
+}
+
+// A step down after the tool has left: whenever the next touch comes, it is that of tissue at rest.
+TEST(RelaxingTissue, AStepDownWithoutATouchLeavesNothingToTheNextOne)
+{
+    const auto again = [](bool isPressedBefore) {
+        Simulation simulation(block(true));
+        DeviceSample sample;
+        sample.axis = {0, 1, 0};
+        const auto goTo = [&](double depth, double speed) {
+            while (std::abs(sample.position.y - depth) > 1e-9) {
+                const double way = depth - sample.position.y;
+                sample.position.y += std::clamp(way, -speed * tickSeconds, speed * tickSeconds);
+                simulation.tick(sample);
+            }
+        };
+        sample.position = {0, -30e-3, 0};
+        goTo(isPressedBefore ? -4e-3 : -20e-3, 0.05);
+        for (int i = 0; i < 1500; ++i) {
+            simulation.tick(sample);
+        }
+        goTo(-30e-3, 0.05);
+        sample.buttons |= modelTooSlow;
+        simulation.tick(sample);
+        sample.buttons &= ~modelTooSlow;
+        for (int i = 0; i < 500; ++i) {
+            simulation.tick(sample);
+        }
+        std::vector<double> force;
+        goTo(-10e-3, 0.05);
+        while (sample.position.y < -6e-3) {
+            sample.position.y += 0.05 * tickSeconds;
+            force.push_back(-simulation.tick(sample).tissueForce.y);
+        }
+        return force;
+    };
+    const auto pressed = again(true), fresh = again(false);
+    ASSERT_EQ(pressed.size(), fresh.size());
+    EXPECT_GT(fresh.back(), 0.05);
+    for (std::size_t i = 0; i < fresh.size(); ++i) {
+        EXPECT_NEAR(pressed[i], fresh[i], 0.02 * fresh[i] + 1e-4) << i;
     }
 }
 

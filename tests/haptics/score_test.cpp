@@ -371,6 +371,21 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
     EXPECT_NEAR(afterShot(0.0, 0.0), 0.0, 1e-9) << "a miss";
     EXPECT_NEAR(afterShot(0.0, 20.0), 20.0, 1e-9) << "a miss";
 
+    // A miss, after which the shaft slides on by 4 mm; a second shot, and the hand has stood still all the time.
+    Scorer twice(synthetic::info());
+    TickRecord shot;
+    shot.phase = Phase::inserted;
+    shot.distance.fill(1);
+    for (const auto& [inserted, fired] :
+         {std::pair(38.0, false), {43.0, true}, {47.0, false}, {47.0, true}, {51.0, false}}) {
+        shot.inserted = inserted * millimetre;
+        shot.distance[0] = (inserted - 36.0) * millimetre;
+        shot.fired = fired;
+        twice.add(shot);
+        ++shot.tick;
+    }
+    EXPECT_NEAR(twice.score().beyondTarget, 5.0 * millimetre, 1e-9) << "a slide that the first shot has excused";
+
     constexpr double nowhere = std::numeric_limits<double>::infinity();
     EXPECT_NEAR(beyond(3.8, 3.0), 0.0, 1e-9);
     EXPECT_NEAR(beyond(2.5, nowhere), 2.5, 1e-9);
