@@ -198,7 +198,7 @@ bool Controls::sceneHoldsProbe() const
 
 void Controls::storePicture()
 {
-    if (picture_.ultrasound().store(images_))
+    if (!hand_.paused() && picture_.ultrasound().store(images_))
         hand_.storePicture();
 }
 
