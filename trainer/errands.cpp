@@ -193,14 +193,9 @@ struct Errands::Impl {
     void seeKept(State& state) { watch(state, "--replay"); }
     void watch(State& state, const char* what)
     {
-        const std::vector<std::string> words{what,
-                                             state.instructor.watched,
-                                             titleOption(state.instructor.watchedTitle),
-                                             "--watch",
-                                             "--layout",
-                                             "instructor",
-                                             "--palette",
-                                             state.settings.palette};
+        const Instructor& i = state.instructor;
+        const std::vector<std::string> words{what,       i.watched,    titleOption(i.watchedTitle),          "--watch",
+                                             "--layout", "instructor", "--palette=" + state.settings.palette};
         eyes.emplace_back(programs / "palpate-view", words, scratch / ("watch-" + std::to_string(++watched) + ".log"));
         state.notice = opening();
     }
