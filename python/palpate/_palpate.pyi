@@ -189,6 +189,9 @@ class Model:
     def lattice(self) -> dict[str, Any]:
         """shape (3), origin (3) [m] and spacing [m] of the nodes of Session.displacement."""
     @property
+    def rate(self) -> float:
+        """Of the ticks [Hz]: 1000, or that of the record that the model came from."""
+    @property
     def hash(self) -> str: ...
 
 class Tick:
@@ -282,7 +285,7 @@ class Session:
             palpate.SceneError, palpate.Error
         """
     def step(self, pose: ArrayLike, buttons: int = ..., fresh: bool = True) -> Tick:
-        """One millisecond.
+        """One tick: a millisecond, unless Model.rate is another.
 
         Args:
             pose: (x, y, z) of the tool's tip, or a sphere's centre [m]; or with the tool's axis behind it (6). Without an
@@ -317,7 +320,8 @@ class Session:
             seconds: at most; 0: until the hand is done.
 
         Returns:
-            rows as run(). Raises palpate.Error where tool, task and trainee do not go together, ValueError for seconds below 0.
+            rows as run(). Raises palpate.Error where tool, task and trainee do not go together or Model.rate is not 1000,
+            ValueError for seconds below 0.
         """
     def close(self) -> None:
         """Ends the record. Raises palpate.Error when it is not whole (a full disk) or not there (removed or moved)."""
@@ -344,8 +348,19 @@ class Session:
             depth: of the picture [m], what the probe has; 0: its own.
 
         Returns:
-            pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
-            depth [m], frequency [Hz], face, direction, lateral, tick.
+            dict: pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
+            top [m], line_pitch [m, curved probe: rad], radius [m, 0 for a linear probe], depth [m], frequency [Hz], face,
+            direction, lateral, tick.
+
+            The probe's marked side is at the left: columns run against `lateral`. The middle of pixel (row, column) is at
+            face + a * lateral + b * direction with
+
+                a = (width / 2 - column - 0.5) * metres_per_pixel
+                b = (row + 0.5) * metres_per_pixel + top
+
+            Lines run along `lateral`, from the right border of the picture to the left: sample k of line i has the depth
+            z = (k + 0.5) * depth / samples, and with l = (i - (lines - 1) / 2) * line_pitch it is at a = l, b = z, of a
+            curved probe at a = (radius + z) * sin(l), b = (radius + z) * cos(l) - radius.
 
         Raises:
             ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size, a depth that

@@ -4,7 +4,7 @@ import unittest
 import numpy as np
 
 import palpate
-from common import InFolder, figures, small_block, wander
+from common import InFolder, figures, program, small_block, wander
 
 
 class Records(InFolder):
@@ -27,6 +27,20 @@ class Records(InFolder):
         again = palpate.Session(record.model())
         np.testing.assert_array_equal(again.run(**record.samples), record.ticks)
         self.assertEqual(again.force_hash, self.hash)
+
+    def test_a_record_of_another_rate_runs_and_is_recorded_at_its_rate(self):
+        file, again = self.folder / "p500.db", self.folder / "again.db"
+        program("stability", "--case", "plate-1mm/spring/touch/grip/500", "--record", file)
+        record = palpate.Record(file)
+        model = record.model()
+        self.assertEqual(model.rate, 500)
+        with palpate.Session(model, record=again) as session:
+            np.testing.assert_array_equal(session.run(**record.samples), record.ticks)
+            self.assertEqual(session.force_hash, record.replay()["force_hash"])
+            with self.assertRaisesRegex(palpate.Error, "500 Hz"):
+                session.perform()
+        self.assertEqual(palpate.Record(again).info["rate"], 500)
+        self.assertTrue(palpate.Record(again).replay()["identical"])
 
     def test_a_probe_s_moves_are_part_of_its_poses(self):
         file = self.folder / "p.db"
