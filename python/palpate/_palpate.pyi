@@ -98,7 +98,7 @@ class Volume:
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:
-        """Writes a .vdb whole, or leaves what was there. Raises palpate.Error."""
+        """Writes a .vdb, and no other name, whole, or leaves what was there. Raises palpate.Error."""
     @property
     def labels(self) -> NDArray[np.uint16]:
         """(i, j, k), read-only. The dense array is made once, when first asked for; further views share it and keep it alive."""
@@ -256,10 +256,17 @@ class Tick:
     @property
     def probe_face(self) -> NDArray[np.float64]: ...
     @property
+    def probe_axis(self) -> NDArray[np.float64]: ...
+    @property
+    def probe_lateral(self) -> NDArray[np.float64]: ...
+    @property
     def probe_force(self) -> NDArray[np.float64]: ...
     @property
     def distance(self) -> NDArray[np.float64]:
         """16 numbers, of which those of the model's structures count [m]."""
+    @property
+    def ahead_distance(self) -> NDArray[np.float64]:
+        """As `distance`, along the needle's line to where it would touch each; infinite where it meets none [m]."""
     @property
     def events(self) -> int: ...
     @property
@@ -405,19 +412,32 @@ class RecordFile:
     def model(self) -> Model: ...
 
 def plan(
-    scene: Scene | Volume | _Path, *, error: float = 0.03, force_error: float | None = None, budget: float = 4e-4, speed: float = 0.02
+    scene: Scene | Volume | _Path,
+    *,
+    error: float = 0.03,
+    force_error: float | None = None,
+    budget: float = 4e-4,
+    speed: float = 0.02,
+    costs: _Path | None = None,
 ) -> dict[str, Any]:
     """The cheapest tissue model that holds an error of the shape (share) and a time per tick [s]: figures of `palpate plan`.
+
+    Args:
+        force_error: of the force, too (share); only level "elastic" can hold it.
+        speed: of the test push [m/s].
+        costs: what `palpate bench costs --json` wrote on the machine that is to run the model; None: the built-in costs of one
+            server core.
 
     Returns:
         found, and where True level, spacing_mm, windows, sweeps, predicted_error_pct, predicted_us; candidates.
 
     Raises:
-        ValueError: an error, budget or speed that is none. palpate.SceneError.
+        ValueError: an error, budget or speed that is none. palpate.SceneError. palpate.Error: costs that are none, a budget
+            that is too small for any model.
     """
 
 def phantoms() -> list[str]: ...
 def scenes() -> list[str]: ...
-def run_sweep(folder: _Path, plan: str, jobs: int, retry: bool, told: Callable[[int, int], bool]) -> int: ...
+def run_sweep(folder: _Path, plan: str, jobs: int, retry: bool, any_build: bool, told: Callable[[int, int], bool]) -> int: ...
 def sweep_outputs() -> dict[str, dict[str, str]]: ...
-def merge_shards(folder: _Path, shards: Sequence[_Path]) -> None: ...
+def merge_shards(folder: _Path, shards: Sequence[_Path], any_build: bool) -> None: ...

@@ -1,7 +1,10 @@
+import contextlib
+import sqlite3
 import threading
 import unittest
 
 import numpy as np
+import pandas
 
 import palpate
 from common import InFolder, figures, program, small_block, wander
@@ -64,6 +67,27 @@ lateral = [1, 0, 0]
         self.assertEqual(record.poses.shape, (600, 12))
         np.testing.assert_array_equal(palpate.Session(record.model()).run(**record.samples), record.ticks)
         self.assertIn("probe_press_m", record.to_dict())
+        self.check_columns(file)
+
+    def check_columns(self, file):
+        """Every column of the file's own table is one of to_dict(), with the same values, as its documentation says."""
+        record = palpate.Record(file)
+        ours = record.to_dict()
+        with contextlib.closing(sqlite3.connect(file)) as database:
+            theirs = pandas.read_sql("SELECT * FROM ticks", database)
+        for i, name in enumerate(record.info["structures"]):
+            theirs = theirs.rename(columns={f"{what}_{i}_m": f"{what}_{name}_m" for what in ("distance", "ahead")})
+        kept = [column for column in theirs if not column.endswith("_us") and column != "seconds"]
+        self.assertEqual(set(kept) - set(ours), set())
+        for column in kept:
+            values = theirs[column].fillna(-1) if column in ("nearest_vital", "warned") else theirs[column]
+            if column in ("phase", "warning"):
+                values = values.map({"phase": palpate.PHASES, "warning": palpate.WARNINGS}[column].index)
+            np.testing.assert_array_equal(ours[column], values.to_numpy(), column)
+        self.assertEqual({column for column in set(ours) - set(kept) if "probe" not in column and "beam" not in column}, {"events"})
+
+    def test_columns_are_those_of_the_file(self):
+        self.check_columns(self.file)
 
     def test_replay_and_score_are_the_program_s(self):
         record = palpate.Record(self.file)
