@@ -148,7 +148,9 @@ void planScene(const PlanArguments& o)
                           100.0 * request.error,
                           request.forceError ? fmt::format(" and {:g} % of the force", 100.0 * *request.forceError) : "",
                           1e6 * request.budget, c.name(), c.error,
-                          request.forceError && c.force ? fmt::format(" and {:.2f} % of the force", *c.force) : "",
+                          !request.forceError ? ""
+                          : c.force           ? fmt::format(" and {:.2f} % of the force", *c.force)
+                                              : ", of the force not known,",
                           c.microseconds);
     }
     if (tell) {
@@ -168,7 +170,8 @@ void addPlan(CLI::App& app)
     command->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
     command->add_option("--error", o->error, "Maximum error of the shape within 30 mm of the tool (rms), e.g. 3% or 0.03")
         ->capture_default_str();
-    command->add_option("--force-error", o->forceError, "Maximum error of the force, e.g. 5% or 0.05 (default: no limit)");
+    command->add_option("--force-error", o->forceError,
+                        "Maximum error of the force, e.g. 5% or 0.05: only level elastic can hold it (default: no limit)");
     command->add_option("--budget", o->budget, "Maximum time per tick, e.g. 400us or 0.4ms")->capture_default_str();
     command::addNumber(*command, "--speed", o->speed, "Speed of the test push [mm/s]", 1.0, 1000.0);
     command->add_flag("--all", o->all, "Try every model within the budget, to see how much a better one costs");

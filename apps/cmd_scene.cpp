@@ -73,6 +73,9 @@ Scene sceneOf(const SceneArguments& o, const volume::Tissue& tissue, const std::
         scene.vital.clear();
         for (const std::string& name : o.vital) {
             checkStructure(tissue, "--vital", name);
+            const bool isThere = std::ranges::find(scene.vital, name, &datasets::VitalStructure::name) != scene.vital.end();
+            base::failIf(name == scene.target || isThere, "--vital {}: is {}: leave it out", name,
+                         isThere ? "named twice" : "the target");
             scene.vital.push_back({.name = name});
         }
         base::failIf(scene.vital.size() > datasets::maxVital, "--vital: {} names: give {} at most", scene.vital.size(),

@@ -5,7 +5,9 @@
 #include <datasets/embedded.h>
 #include <datasets/toml_fields.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 
@@ -224,22 +226,29 @@ void readModel(Section& top, ModelSettings& model)
     }
 }
 
-void readTarget(Section& top, Scene& scene)
+// Whether the target and each vital structure have names of their own: their measures are told apart by them.
+enum class Names : std::uint8_t { once, any };
+
+void readTarget(Section& top, Names names, Scene& scene)
 {
     if (std::optional<Section> section = top.section("target")) {
         scene.target = section->word("structure").value_or(scene.target);
+        const bool isVital = std::ranges::find(scene.vital, scene.target, &VitalStructure::name) != scene.vital.end();
+        section->refuseIf(isVital && names == Names::once, "structure", "is in [[vital]] too: leave one of them out");
         scene.entry = section->point("entry_mm", farthestCoordinate);
         scene.aim = section->point("aim_mm", farthestCoordinate);
         section->finish();
     }
 }
 
-void readVital(Section& top, std::vector<VitalStructure>& vital)
+void readVital(Section& top, Names names, std::vector<VitalStructure>& vital)
 {
     for (Section& section : top.sections("vital")) {
         VitalStructure structure;
         readFields<VitalStructure>(section, vitalFields, structure, Need::some);
         section.missingIf(structure.name.empty(), "name", "a structure or tissue of the volume");
+        const bool isThere = std::ranges::find(vital, structure.name, &VitalStructure::name) != vital.end();
+        section.refuseIf(isThere && names == Names::once, "name", "is in another [[vital]] too: leave one of them out");
         section.finish();
         vital.push_back(std::move(structure));
         section.refuseIf(vital.size() > maxVital, "name", fmt::format("over {} vital structures", maxVital));
@@ -354,9 +363,7 @@ std::string stepText(const TraineeStep& step)
                        moves ? "to_mm = " + millimetres(step.to) + "\n" : "", writeFields<TraineeStep>(stepFields, step));
 }
 
-}  // namespace
-
-Scene parseScene(const std::string& text, const std::filesystem::path& origin)
+Scene readScene(const std::string& text, const std::filesystem::path& origin, Names names)
 {
     const toml::table root = parseToml(text, origin.string());
     Section top(root, origin.string(), "");
@@ -373,8 +380,8 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     readTool(top, scene.tool);
     readModel(top, scene.model);
     readDffb(top, scene.dffb);
-    readVital(top, scene.vital);
-    readTarget(top, scene);
+    readVital(top, names, scene.vital);
+    readTarget(top, names, scene);
     if (std::optional<Section> safety = top.section("safety")) {
         scene.forceCap = safety->number("cap_n", "N", 0.1, 50).value_or(scene.forceCap);
         scene.device = safety->word("device").value_or(scene.device);
@@ -397,6 +404,18 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
         replaceString(scene.text, root["volume"]["file"].node(), scene.source.file.string());
     }
     return scene;
+}
+
+}  // namespace
+
+Scene parseScene(const std::string& text, const std::filesystem::path& origin)
+{
+    return readScene(text, origin, Names::once);
+}
+
+Scene parseRecordedScene(const std::string& text, const std::filesystem::path& origin)
+{
+    return readScene(text, origin, Names::any);
 }
 
 Scene loadScene(const std::filesystem::path& file)

@@ -31,6 +31,9 @@ std::string ctText(const CtSpec& ct);
 void readGravity(Section& top, GravitySpec& gravity);
 std::string gravityText(const GravitySpec& gravity);
 
+/// As parseScene(), of a record's text, which may name a structure several times among the target and [[vital]].
+Scene parseRecordedScene(const std::string& text, const std::filesystem::path& origin);
+
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);
 /// What the volume of a scene follows from, as text: scenes with the same text have the same sceneVolume().

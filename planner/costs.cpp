@@ -1,6 +1,7 @@
 #include <planner/costs.h>
 
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -116,6 +117,9 @@ void benchCosts(const CostsArguments& o)
 PlanCosts loadCosts(const std::filesystem::path& file)
 {
     PlanCosts costs;
+    const std::string why = base::whyNoFile(file);
+    base::failIf(!why.empty(), "{}: {}: 'palpate bench costs --json {}' makes such a file", file.native(), why,
+                 file.native());
     std::ifstream in(file);
     const auto json = nlohmann::json::parse(in, nullptr, false);
     for (const auto& [law, to] : {std::pair("small", &costs.small), std::pair("finite", &costs.finite)}) {

@@ -225,10 +225,11 @@ private:
         c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
     }
 
-    // By what factor the worse of both errors is over what may be.
+    // By what factor the worse of both errors is over what may be. A force that is not known may be off by anything.
     double overError(const PlanCandidate& c) const
     {
-        const double force = request_.forceError ? c.force.value_or(0.0) / (100.0 * *request_.forceError) : 0.0;
+        constexpr double unknown = std::numeric_limits<double>::infinity();
+        const double force = request_.forceError ? c.force.value_or(unknown) / (100.0 * *request_.forceError) : 0.0;
         return std::max(c.error / (100.0 * request_.error), force);
     }
 
@@ -345,7 +346,7 @@ Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
 {
     // What the spring takes, every model does.
     base::failIf(1e6 * request.budget < request.costs.usPerTick,
-                 "--budget: {:g} us: every model takes over {:g} us per tick: give more", 1e6 * request.budget,
+                 "budget: {:g} us: every model takes over {:g} us per tick: give more", 1e6 * request.budget,
                  request.costs.usPerTick);
     return Planner(model, request, progress).run();
 }

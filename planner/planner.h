@@ -65,7 +65,7 @@ struct PlanCosts {
 
 struct PlanRequest {
     double error = 0.03;               // of the shape near the tool, share that may not be passed: see PlanCandidate::error
-    std::optional<double> forceError;  // of the force, where the level knows it; nothing: any
+    std::optional<double> forceError;  // of the force: only level `elastic` can hold it; nothing: any
     double budget = 4e-4;              // of a tick [s]
     double speed = 0.02;               // of the test pushes [m/s]
     bool all = false;  // try every candidate within the budget, also those that are no cheaper than the choice

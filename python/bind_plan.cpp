@@ -1,16 +1,19 @@
 #include <python/scene_box.h>
 
+#include <planner/costs.h>
 #include <planner/figures.h>
 #include <planner/planner.h>
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
 namespace palpate::python {
 
 namespace {
 
-py::object plan(const py::object& what, double error, const std::optional<double>& forceError, double budget, double speed)
+py::object plan(const py::object& what, double error, const std::optional<double>& forceError, double budget, double speed,
+                const std::optional<std::filesystem::path>& costs)
 {
     refuseIf(!(error > 0 && error <= 1) || (forceError && !(*forceError > 0 && *forceError <= 1)),
              "error, force_error: have to be above 0, and 1 at most: 0.03 is 3 %");
@@ -23,6 +26,9 @@ py::object plan(const py::object& what, double error, const std::optional<double
     request.forceError = forceError;
     request.budget = budget;
     request.speed = speed;
+    if (costs) {
+        request.costs = planner::loadCosts(*costs);
+    }
     nlohmann::json figures;
     {
         const py::gil_scoped_release others;
@@ -30,7 +36,7 @@ py::object plan(const py::object& what, double error, const std::optional<double
         auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
         const auto model = haptics::buildModel(std::move(box.scene), std::move(tissue));
         const auto found = planner::planModel(model, request, [](const std::string&) {});
-        figures = planner::planFigures(name, found, request, "");
+        figures = planner::planFigures(name, found, request, costs ? costs->string() : "");
     }
     return toPython(figures);
 }
@@ -40,7 +46,7 @@ py::object plan(const py::object& what, double error, const std::optional<double
 void bindPlan(py::module_& module)
 {
     module.def("plan", &plan, py::arg("scene"), py::kw_only(), py::arg("error") = 0.03, py::arg("force_error") = py::none(),
-               py::arg("budget") = 4e-4, py::arg("speed") = 0.02);
+               py::arg("budget") = 4e-4, py::arg("speed") = 0.02, py::arg("costs") = py::none());
 }
 
 }  // namespace palpate::python

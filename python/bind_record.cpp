@@ -116,6 +116,7 @@ std::shared_ptr<Modelled> modelOfRecord(const RecordBox& box)
     const py::gil_scoped_release others;
     auto made =
         std::make_shared<Modelled>(session::reopenSession(box.file, box.record.info()), box.record.info().sceneOrigin);
+    made->info.rate = box.record.info().rate;
     made->given = made->model.posture ? nullptr : made->model.tissue;
     return made;
 }

@@ -203,6 +203,7 @@ void bindModel(py::module_& module)
                                    return datasets::firingDepth(m.model.scene.tool, glm::distance(line.entry, line.aim));
                                })
         .def_property_readonly("lattice", latticeOf)
+        .def_property_readonly("rate", [](const Modelled& m) { return m.info.rate; })
         .def_property_readonly("hash", [](const Modelled& m) { return m.info.volumeHash; });
 }
 

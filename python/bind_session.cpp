@@ -2,6 +2,7 @@
 #include <python/scene_box.h>
 #include <python/tick_rows.h>
 
+#include <base/error.h>
 #include <session/devices.h>
 #include <session/figures.h>
 #include <volume/direction.h>
@@ -195,6 +196,9 @@ std::size_t advance(SessionBox& box, const py::object& poses, const py::object& 
 py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
 {
     refuseIf(!(seconds >= 0), "seconds: has to be 0 or more");
+    const double rate = box.live.modelled().info.rate;
+    base::failIf(rate != 1.0 / haptics::tickSeconds,
+                 "perform: the model is of a record at {:g} Hz, and simulated hands move at 1000 Hz: use run()", rate);
     const LiveSession::Use use(box.live);
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
@@ -295,6 +299,10 @@ py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object
     out["pixels"] = pixels;
     out["lines"] = lines;
     out["metres_per_pixel"] = picture.metresPerPixel;
+    const ultrasound::Transducer& probe = picture.image.transducer;
+    out["top"] = picture.top;
+    out["line_pitch"] = picture.pitch;
+    out["radius"] = probe.shape == ultrasound::ProbeShape::curved ? probe.radius : 0.0F;
     out["depth"] = picture.image.settings.depth;
     out["frequency"] = picture.image.settings.frequency;
     out["face"] = vectorOf(picture.image.pose.face);
@@ -350,8 +358,11 @@ void bindTick(py::module_& module)
         .def_property_readonly("warned", [](const TickBox& t) { return t.row.warned; })
         .def_property_readonly("probe_move", [](const TickBox& t) { return numbersOf(t.row.probeMove); })
         .def_property_readonly("probe_face", [](const TickBox& t) { return vectorField(t.row.probeFace); })
+        .def_property_readonly("probe_axis", [](const TickBox& t) { return vectorField(t.row.probeAxis); })
+        .def_property_readonly("probe_lateral", [](const TickBox& t) { return vectorField(t.row.probeLateral); })
         .def_property_readonly("probe_force", [](const TickBox& t) { return vectorField(t.row.probeForce); })
         .def_property_readonly("distance", [](const TickBox& t) { return numbersOf(t.row.distance); })
+        .def_property_readonly("ahead_distance", [](const TickBox& t) { return numbersOf(t.row.aheadDistance); })
         .def_property_readonly("events", [](const TickBox& t) { return t.row.events; })
         .def_property_readonly("fired", [](const TickBox& t) { return t.row.fired != 0; })
         .def_property_readonly("faulted", [](const TickBox& t) { return t.row.faulted != 0; });

@@ -20,13 +20,13 @@ using sweep::SweepFolder;
 
 // Runs what is left of a sweep. It forks, so that only a process of one thread may call it (palpate/_sweep_worker.py).
 // `told(done, of)` is called ten times a second; false ends the run after the cases in flight.
-std::size_t runSweep(const std::filesystem::path& folder, const std::string& plan, int jobs, bool retry,
+std::size_t runSweep(const std::filesystem::path& folder, const std::string& plan, int jobs, bool retry, bool anyBuild,
                      const py::function& told)
 {
     const auto alone = sweep::oneThread();
     SweepFolder held(folder, plan, true);
     held.clean();
-    const sweep::CasesWanted wanted{sweep::casesOfShard("1/1", held.plan().cases()), retry, false};
+    const sweep::CasesWanted wanted{sweep::casesOfShard("1/1", held.plan().cases()), retry, anyBuild};
     const auto cases = sweep::remainingCases(held, wanted, [](const std::string&) {});
     const std::size_t all = held.plan().cases(), before = all - cases.size();
     // An interrupt may come while Python reports: the cases in flight are finished and the tables written in any case.
@@ -74,16 +74,16 @@ py::dict outputs()
 void bindSweep(py::module_& module)
 {
     module.def("run_sweep", &runSweep, py::arg("folder"), py::arg("plan"), py::arg("jobs"), py::arg("retry"),
-               py::arg("told"));
+               py::arg("any_build"), py::arg("told"));
     module.def("sweep_outputs", &outputs);
     module.def(
         "merge_shards",
-        [](const std::filesystem::path& folder, const std::vector<std::filesystem::path>& shards) {
-            sweep::mergeShards(folder, shards);
+        [](const std::filesystem::path& folder, const std::vector<std::filesystem::path>& shards, bool anyBuild) {
+            sweep::mergeShards(folder, shards, anyBuild);
             const SweepFolder merged(folder, "", true);
             sweep::writeTables(merged, merged.rows());
         },
-        py::arg("folder"), py::arg("shards"));
+        py::arg("folder"), py::arg("shards"), py::arg("any_build"));
 }
 
 }  // namespace palpate::python

@@ -1,5 +1,6 @@
 #include <python/scene_box.h>
 
+#include <base/error.h>
 #include <datasets/phantom.h>
 #include <datasets/tables.h>
 #include <report/volume.h>
@@ -341,6 +342,7 @@ void bindVolume(py::module_& module)
         .def(
             "save",
             [](VolumeBox& box, const Path& file) {
+                base::failIf(file.extension() != ".vdb", "{}: a volume is a .vdb file: name it so", file.native());
                 {
                     const py::gil_scoped_release others;
                     box.tissue->save(file);

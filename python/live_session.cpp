@@ -47,8 +47,10 @@ UltrasoundPicture LiveUltrasound::picture(const haptics::Simulation& simulation,
     scanner_.scan(examination_.transducer, settings, pose, body_, state, out.image);
     converter_.convert(out.image, request.width, request.height, out.pixels);
     const ultrasound::Beam beam(examination_.transducer, settings);
-    out.metresPerPixel =
-        1.0 / static_cast<double>(ultrasound::Layout(beam, request.width, request.height).pixelsPerMetre());
+    const ultrasound::Layout layout(beam, request.width, request.height, false, {0, 0});
+    out.metresPerPixel = 1.0 / static_cast<double>(layout.pixelsPerMetre());
+    out.top = static_cast<double>(beam.top());
+    out.pitch = static_cast<double>(beam.pitch());
     return out;
 }
 
@@ -63,6 +65,7 @@ haptics::SessionInfo infoFor(const Modelled& modelled, const std::string& operat
 {
     haptics::SessionInfo info = session::describeSession(modelled.model, modelled.info.sceneOrigin, "python");
     info.operatorName = operatorName;
+    info.rate = modelled.info.rate;
     return info;
 }
 

@@ -35,6 +35,8 @@ struct UltrasoundPicture {
     ultrasound::BeamImage image;
     ultrasound::Pixels pixels;
     double metresPerPixel = 0;
+    double top = 0;    // of the picture's upper border along the probe's axis, below 0 where its face is curved [m]
+    double pitch = 0;  // between lines [m], of a curved probe [rad]
 };
 
 /// A scanner beside a session.
@@ -53,7 +55,7 @@ private:
     ultrasound::Scanner scanner_;
     channel::Deformation body_;
     ultrasound::Examination examination_;
-    ultrasound::ScanConverter converter_;
+    ultrasound::ScanConverter converter_{ultrasound::Margins{0, 0}};
     std::unique_ptr<channel::Displaced> shape_ = std::make_unique<channel::Displaced>();
 };
 

@@ -61,6 +61,8 @@ TickRow rowOf(const haptics::TickRecord& t) noexcept
     const auto& move = t.device.probe;
     row.probeMove = {move.press, move.slide, move.sweep, move.rock, move.tilt, move.turn};
     row.probeFace = arrayOf(t.probeFace);
+    row.probeAxis = arrayOf(t.probeAxis);
+    row.probeLateral = arrayOf(t.probeLateral);
     row.probeForce = arrayOf(t.probeForce);
     row.needleInBeam = t.needleInBeam;
     row.tipInBeam = t.tipInBeam ? 1 : 0;
@@ -69,6 +71,7 @@ TickRow rowOf(const haptics::TickRecord& t) noexcept
     row.ahead = t.ahead.tissueDistance;
     row.aheadSpeed = t.ahead.speed;
     row.distance = t.distance;
+    row.aheadDistance = t.ahead.structure;
     row.buttons = t.device.buttons;
     for (std::uint32_t i = 0; i < t.eventCount; ++i) {
         row.events |= 1U << static_cast<unsigned>(t.events[i].kind);
@@ -118,11 +121,14 @@ py::dtype tickType(std::size_t structures)
         .add("ahead_tissue", "u1", offsetof(TickRow, aheadTissue))
         .add("ahead_speed", "f8", offsetof(TickRow, aheadSpeed))
         .add("distance", distances, offsetof(TickRow, distance))
+        .add("ahead_distance", distances, offsetof(TickRow, aheadDistance))
         .add("events", "u4", offsetof(TickRow, events))
         .add("fired", "?", offsetof(TickRow, fired))
         .add("faulted", "?", offsetof(TickRow, faulted))
         .add("probe_move", "(6,)f8", offsetof(TickRow, probeMove))
         .add("probe_face", "(3,)f8", offsetof(TickRow, probeFace))
+        .add("probe_axis", "(3,)f8", offsetof(TickRow, probeAxis))
+        .add("probe_lateral", "(3,)f8", offsetof(TickRow, probeLateral))
         .add("probe_force", "(3,)f8", offsetof(TickRow, probeForce))
         .add("needle_in_beam", "f8", offsetof(TickRow, needleInBeam))
         .add("tip_in_beam", "?", offsetof(TickRow, tipInBeam))

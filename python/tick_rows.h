@@ -19,11 +19,13 @@ struct TickRow {
     double inserted;                                              // [m]
     std::array<double, 3> deflection;                             // [m]
     std::array<double, 6> probeMove;                              // press, slide, sweep [m], rock, tilt, turn [rad]
-    std::array<double, 3> probeFace, probeForce;                  // [m], [N]
+    std::array<double, 3> probeFace, probeAxis, probeLateral;     // [m], unit vectors
+    std::array<double, 3> probeForce;                             // [N]
     double needleInBeam;                                          // [m]
     double penetration, residual;                                 // [m]
     double ahead, aheadSpeed;                                     // [m], [m/s]
     std::array<double, haptics::maxStructures> distance;          // [m]
+    std::array<double, haptics::maxStructures> aheadDistance;     // [m], infinite where the needle meets none
     std::uint32_t buttons, events, contacts, moved;               // events: bit k is kind k
     std::uint8_t phase, tissue, warning, aheadTissue;             // numbers of names
     std::int8_t nearestVital, warned;                             // numbers of structures; -1: none

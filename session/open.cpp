@@ -87,6 +87,7 @@ void change(Scene& scene, const SceneChanges& changes)
         palpated(scene);
     }
     scene.target = changes.target.value_or(scene.target);
+    std::erase_if(scene.vital, [&](const datasets::VitalStructure& vital) { return vital.name == scene.target; });
     scene.source.phantom.seed = changes.seed.value_or(scene.source.phantom.seed);
     if (changes.voxelsPerSide) {
         scene.source.phantom.numbers["voxels_per_side"] = *changes.voxelsPerSide;
@@ -221,7 +222,7 @@ std::string widerCells(const haptics::SessionModel& model)
 
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
 {
-    auto model = haptics::buildModel(datasets::parseScene(info.sceneText, info.sceneOrigin));
+    auto model = haptics::buildModel(datasets::parseRecordedScene(info.sceneText, info.sceneOrigin));
     base::failIf(haptics::modelHash(model) != info.volumeHash,
                  "{}: the volume or the tissue table of this session has changed since it was recorded; replay it with "
                  "those it was recorded with",

@@ -11,7 +11,8 @@ using namespace haptics;
 constexpr std::size_t maxCores = 64;
 constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
 
-Session::Session(const SessionModel& model, const SessionInfo& info) : simulation_(model), info_(info), watch_(info)
+Session::Session(const SessionModel& model, const SessionInfo& info)
+    : simulation_(model, {1.0 / info.rate, {}}), info_(info), watch_(info)
 {
     figures_.cores.reserve(maxCores);
     figures_.nearest.fill(std::numeric_limits<double>::infinity());

@@ -44,12 +44,13 @@ struct RunOptions {
 class Session {
 public:
     /// @param model  must outlive the session
-    /// @param info   of this model, see describeSession(): what the score goes by
+    /// @param info   of this model, see describeSession(): what the score goes by, and the rate of its ticks
     /// Throws std::runtime_error for a scene with a device that is not known.
     Session(const haptics::SessionModel& model, const haptics::SessionInfo& info);
     Session(haptics::SessionModel&&, const haptics::SessionInfo&) = delete;  // a temporary would not outlive it
 
-    /// One millisecond: the pose of the tool in, forces and events out. The same poses give the same ticks, bit for bit.
+    /// One tick, a millisecond unless `info` has another rate: the pose of the tool in, forces and events out. The same
+    /// poses give the same ticks, bit for bit.
     /// @returns  valid until the next tick
     const haptics::TickRecord& tick(const haptics::DeviceSample& pose) noexcept;
 

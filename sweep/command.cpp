@@ -259,7 +259,10 @@ std::vector<std::size_t> conclude(const SweepArguments& o, const SweepFolder& fo
     }
     if (!wanted.empty() && failed == wanted.size()) {
         const auto first = std::ranges::find_if(rows, [](const auto& r) { return r && r->failed(); });
-        throw std::runtime_error("every case failed: " + (*first)->error);
+        const std::string problem = "every case failed: " + (*first)->error;
+        // Other parts may have cases that do not: who runs them all goes on to the merge, which tells.
+        base::failIf(!isPart(o), "{}", problem);
+        fmt::print(stderr, "palpate: {}\n", problem);
     }
     std::vector<std::size_t> missing;
     std::ranges::copy_if(wanted, std::back_inserter(missing), [&](std::size_t i) { return !rows[i]; });

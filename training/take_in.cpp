@@ -4,7 +4,7 @@
 
 #include <base/error.h>
 #include <base/split.h>
-#include <datasets/scene.h>
+#include <datasets/scene_text.h>
 #include <haptics/measures.h>
 
 #include <algorithm>
@@ -60,7 +60,7 @@ double guidanceIn(const haptics::SessionInfo& info)
     if (info.sceneText.empty()) {
         return 1;
     }
-    const auto dffb = datasets::parseScene(info.sceneText, info.sceneOrigin).dffb;
+    const auto dffb = datasets::parseRecordedScene(info.sceneText, info.sceneOrigin).dffb;
     return dffb.mode == datasets::DffbMode::off ? 0 : std::min(dffb.gain, 1.0);
 }
 

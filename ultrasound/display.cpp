@@ -7,8 +7,6 @@ namespace palpate::ultrasound {
 
 namespace {
 
-constexpr int above = 10, beside = 40;  // margins [pixels]
-
 void bar(Pixels& p, float x, float y, int width, int height, std::uint8_t grey)
 {
     const int left = static_cast<int>(std::lround(x)), top = static_cast<int>(std::lround(y));
@@ -19,10 +17,11 @@ void bar(Pixels& p, float x, float y, int width, int height, std::uint8_t grey)
 
 }  // namespace
 
-Layout::Layout(const Beam& beam, int width, int height, bool mirrored)
-    : scale_(std::min(static_cast<float>(std::max(height - 2 * above, 1)) / (beam.settings().depth - beam.top()),
-                      static_cast<float>(std::max(width - 2 * beside, 1)) / (2 * beam.halfWidth()))),
+Layout::Layout(const Beam& beam, int width, int height, bool mirrored, Margins margins)
+    : scale_(std::min(static_cast<float>(std::max(height - 2 * margins.above, 1)) / (beam.settings().depth - beam.top()),
+                      static_cast<float>(std::max(width - 2 * margins.beside, 1)) / (2 * beam.halfWidth()))),
       middle_(0.5F * static_cast<float>(width)),
+      above_(static_cast<float>(margins.above)),
       top_(beam.top()),
       left_(mirrored ? -1.0F : 1.0F)
 {
@@ -30,12 +29,12 @@ Layout::Layout(const Beam& beam, int width, int height, bool mirrored)
 
 glm::vec2 Layout::pixel(float lateral, float axial) const noexcept
 {
-    return {middle_ - left_ * lateral * scale_, above + (axial - top_) * scale_};
+    return {middle_ - left_ * lateral * scale_, above_ + (axial - top_) * scale_};
 }
 
 glm::vec2 Layout::point(float column, float row) const noexcept
 {
-    return {left_ * (middle_ - column - 0.5F) / scale_, (row + 0.5F - above) / scale_ + top_};
+    return {left_ * (middle_ - column - 0.5F) / scale_, (row + 0.5F - above_) / scale_ + top_};
 }
 
 void ScanConverter::makeTable(const Beam& beam, const Layout& layout)
@@ -68,7 +67,7 @@ void ScanConverter::convert(const BeamImage& image, int width, int height, Pixel
         width_ = width;
         height_ = height;
         const Beam beam(image.transducer, image.settings);
-        makeTable(beam, Layout(beam, width, height, image.mirrored));
+        makeTable(beam, Layout(beam, width, height, image.mirrored, margins_));
     }
     out.width = width;
     out.height = height;
@@ -97,7 +96,7 @@ void drawMarks(const BeamImage& image, Pixels& pixels)
     for (int mm = 0; mm <= deepest; mm += 5)
         bar(pixels, right, layout.pixel(0, 1e-3F * static_cast<float>(mm)).y, mm % 10 == 0 ? 12 : 6, 2, tick);
     bar(pixels, right + 16, layout.pixel(0, image.settings.focus).y - 3, 6, 7, mark);
-    bar(pixels, image.mirrored ? middle + half + 9 : middle - half - 18, above + 2, 9, 9, mark);
+    bar(pixels, image.mirrored ? middle + half + 9 : middle - half - 18, Margins().above + 2, 9, 9, mark);
 }
 
 }  // namespace palpate::ultrasound

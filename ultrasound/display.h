@@ -27,10 +27,16 @@ struct Pixels {
     std::vector<std::uint8_t> grey;
 };
 
+/// What a window has around the picture: room for its scale and marks, unless told otherwise [pixels].
+struct Margins {
+    int above = 10;   // and below
+    int beside = 40;  // on both sides
+};
+
 /// Where the picture's plane lies in a window of pixels: depth downwards, the marked side at the left, or at the right.
 class Layout {
 public:
-    Layout(const Beam& beam, int width, int height, bool mirrored = false);
+    Layout(const Beam& beam, int width, int height, bool mirrored = false, Margins margins = {});
 
     /// Pixel (column, row from the top) of a point of the plane [m].
     glm::vec2 pixel(float lateral, float axial) const noexcept;
@@ -39,12 +45,14 @@ public:
     float pixelsPerMetre() const noexcept { return scale_; }
 
 private:
-    float scale_, middle_, top_, left_;
+    float scale_, middle_, above_, top_, left_;
 };
 
 /// Scan conversion by a table that is made once for each geometry.
 class ScanConverter {
 public:
+    explicit ScanConverter(Margins margins = {}) : margins_(margins) {}
+
     void convert(const BeamImage& image, int width, int height, Pixels& out);
 
 private:
@@ -54,6 +62,7 @@ private:
     };
     void makeTable(const Beam& beam, const Layout& layout);
 
+    Margins margins_;
     Settings of_;
     ProbeShape shape_ = ProbeShape::linear;
     bool mirrored_ = false;

@@ -8,6 +8,7 @@ Each part is `palpate sweep --shard K/N` in a process of its own, so that a work
 Python but Dask. A part that was interrupted goes on where it was when this is run again.
 """
 import argparse
+import os
 import subprocess
 
 from dask.distributed import Client, as_completed
@@ -29,12 +30,15 @@ def main():
     parser.add_argument("--shards", type=int, default=20)
     parser.add_argument("--scheduler", help="address; without it, workers on this machine, one per core")
     options = parser.parse_args()
+    # A worker has a working directory of its own; a plan that is no file is a ready one.
+    folder = os.path.abspath(options.folder)
+    plan = os.path.abspath(options.plan) if os.path.isfile(options.plan) else options.plan
     with Client(options.scheduler) if options.scheduler else Client(threads_per_worker=1, dashboard_address=None) as client:
-        parts = [client.submit(shard, options.plan, options.folder, k, options.shards, pure=False)
+        parts = [client.submit(shard, plan, folder, k, options.shards, pure=False)
                  for k in range(1, options.shards + 1)]
         for count, part in enumerate(as_completed(parts), 1):
             print(f"part {part.result()} is done, {count} of {options.shards}", flush=True)
-    subprocess.run(["palpate", "sweep", "-o", options.folder, "--merge"], check=True)
+    subprocess.run(["palpate", "sweep", "-o", folder, "--merge"], check=True)
 
 
 if __name__ == "__main__":

@@ -98,7 +98,7 @@ class Volume:
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:
-        """Writes a .vdb whole, or leaves what was there. Raises palpate.Error."""
+        """Writes a .vdb, and no other name, whole, or leaves what was there. Raises palpate.Error."""
     @property
     def labels(self) -> NDArray[np.uint16]:
         """(i, j, k), read-only. The dense array is made once, when first asked for; further views share it and keep it alive."""
@@ -189,6 +189,9 @@ class Model:
     def lattice(self) -> dict[str, Any]:
         """shape (3), origin (3) [m] and spacing [m] of the nodes of Session.displacement."""
     @property
+    def rate(self) -> float:
+        """Of the ticks [Hz]: 1000, or that of the record that the model came from."""
+    @property
     def hash(self) -> str: ...
 
 class Tick:
@@ -253,10 +256,17 @@ class Tick:
     @property
     def probe_face(self) -> NDArray[np.float64]: ...
     @property
+    def probe_axis(self) -> NDArray[np.float64]: ...
+    @property
+    def probe_lateral(self) -> NDArray[np.float64]: ...
+    @property
     def probe_force(self) -> NDArray[np.float64]: ...
     @property
     def distance(self) -> NDArray[np.float64]:
         """16 numbers, of which those of the model's structures count [m]."""
+    @property
+    def ahead_distance(self) -> NDArray[np.float64]:
+        """As `distance`, along the needle's line to where it would touch each; infinite where it meets none [m]."""
     @property
     def events(self) -> int: ...
     @property
@@ -282,7 +292,7 @@ class Session:
             palpate.SceneError, palpate.Error
         """
     def step(self, pose: ArrayLike, buttons: int = ..., fresh: bool = True) -> Tick:
-        """One millisecond.
+        """One tick: a millisecond, unless Model.rate is another.
 
         Args:
             pose: (x, y, z) of the tool's tip, or a sphere's centre [m]; or with the tool's axis behind it (6). Without an
@@ -317,7 +327,8 @@ class Session:
             seconds: at most; 0: until the hand is done.
 
         Returns:
-            rows as run(). Raises palpate.Error where tool, task and trainee do not go together, ValueError for seconds below 0.
+            rows as run(). Raises palpate.Error where tool, task and trainee do not go together or Model.rate is not 1000,
+            ValueError for seconds below 0.
         """
     def close(self) -> None:
         """Ends the record. Raises palpate.Error when it is not whole (a full disk) or not there (removed or moved)."""
@@ -344,8 +355,19 @@ class Session:
             depth: of the picture [m], what the probe has; 0: its own.
 
         Returns:
-            pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
-            depth [m], frequency [Hz], face, direction, lateral, tick.
+            dict: pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
+            top [m], line_pitch [m, curved probe: rad], radius [m, 0 for a linear probe], depth [m], frequency [Hz], face,
+            direction, lateral, tick.
+
+            The probe's marked side is at the left: columns run against `lateral`. The middle of pixel (row, column) is at
+            face + a * lateral + b * direction with
+
+                a = (width / 2 - column - 0.5) * metres_per_pixel
+                b = (row + 0.5) * metres_per_pixel + top
+
+            Lines run along `lateral`, from the right border of the picture to the left: sample k of line i has the depth
+            z = (k + 0.5) * depth / samples, and with l = (i - (lines - 1) / 2) * line_pitch it is at a = l, b = z, of a
+            curved probe at a = (radius + z) * sin(l), b = (radius + z) * cos(l) - radius.
 
         Raises:
             ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size, a depth that
@@ -390,19 +412,32 @@ class RecordFile:
     def model(self) -> Model: ...
 
 def plan(
-    scene: Scene | Volume | _Path, *, error: float = 0.03, force_error: float | None = None, budget: float = 4e-4, speed: float = 0.02
+    scene: Scene | Volume | _Path,
+    *,
+    error: float = 0.03,
+    force_error: float | None = None,
+    budget: float = 4e-4,
+    speed: float = 0.02,
+    costs: _Path | None = None,
 ) -> dict[str, Any]:
     """The cheapest tissue model that holds an error of the shape (share) and a time per tick [s]: figures of `palpate plan`.
+
+    Args:
+        force_error: of the force, too (share); only level "elastic" can hold it.
+        speed: of the test push [m/s].
+        costs: what `palpate bench costs --json` wrote on the machine that is to run the model; None: the built-in costs of one
+            server core.
 
     Returns:
         found, and where True level, spacing_mm, windows, sweeps, predicted_error_pct, predicted_us; candidates.
 
     Raises:
-        ValueError: an error, budget or speed that is none. palpate.SceneError.
+        ValueError: an error, budget or speed that is none. palpate.SceneError. palpate.Error: costs that are none, a budget
+            that is too small for any model.
     """
 
 def phantoms() -> list[str]: ...
 def scenes() -> list[str]: ...
-def run_sweep(folder: _Path, plan: str, jobs: int, retry: bool, told: Callable[[int, int], bool]) -> int: ...
+def run_sweep(folder: _Path, plan: str, jobs: int, retry: bool, any_build: bool, told: Callable[[int, int], bool]) -> int: ...
 def sweep_outputs() -> dict[str, dict[str, str]]: ...
-def merge_shards(folder: _Path, shards: Sequence[_Path]) -> None: ...
+def merge_shards(folder: _Path, shards: Sequence[_Path], any_build: bool) -> None: ...

@@ -8,6 +8,18 @@ from numpy.typing import ArrayLike, NDArray
 from ._palpate import TICK_SECONDS
 
 
+def _numbers(value: ArrayLike, name: str, shape: tuple[int, ...], wanted: str) -> NDArray[np.float64]:
+    if np.ma.isMaskedArray(value):
+        raise ValueError(f"{name}: is a masked array: give a plain one, such as its filled()")
+    try:
+        array = np.asarray(value)
+    except ValueError:  # of rows that differ in length
+        array = np.array("")
+    if array.dtype.kind not in "biuf" or array.shape != shape:
+        raise ValueError(f"{name}: give {wanted}")
+    return array.astype(float)
+
+
 def press_path(
     start: ArrayLike, direction: ArrayLike, depth: float, *, speed: float = 0.02, hold: float = 0.1, lead: float = 1e-3
 ) -> NDArray[np.float64]:
@@ -23,9 +35,15 @@ def press_path(
 
     Returns:
         n x 3 positions [m], float64.
+
+    Raises:
+        ValueError: what is given is no point, direction or number, or out of range.
     """
-    start, direction = np.asarray(start, float), np.asarray(direction, float)
-    given = np.concatenate([start.ravel(), direction.ravel(), np.array([depth, speed, hold, lead], float)])
+    start = _numbers(start, "start", (3,), "three numbers, in metres")
+    direction = _numbers(direction, "direction", (3,), "three numbers")
+    numbers = {"depth": depth, "speed": speed, "hold": hold, "lead": lead}
+    depth, speed, hold, lead = (_numbers(value, name, (), "one number").item() for name, value in numbers.items())
+    given = np.concatenate([start, direction, [depth, speed, hold, lead]])
     if not np.isfinite(given).all():
         raise ValueError("press_path: start, direction, depth, speed, hold and lead have to be finite")
     length = np.linalg.norm(direction)

@@ -13,11 +13,12 @@ from ._palpate import Model, RecordFile, Session
 if TYPE_CHECKING:
     import pandas  # type: ignore[import]
 
-# Columns of a table, by field of a tick: the names that a record's own table has.
+# Columns of a table, by field of a tick: the names that a record's own table has, but for those that name a structure.
 _VECTORS = {
     "position": "tip_{}_m", "axis": "axis_{}", "proxy": "proxy_{}_m", "tissue_force": "tissue_force_{}_n",
     "basic": "basic_{}_n", "additional": "additional_{}_n", "total": "total_{}_n", "deflection": "deflection_{}_m",
-    "probe_face": "probe_face_{}_m", "probe_force": "probe_force_{}_n",
+    "probe_face": "probe_face_{}_m", "probe_axis": "probe_axis_{}", "probe_lateral": "probe_lateral_{}",
+    "probe_force": "probe_force_{}_n",
 }
 _NUMBERS = {
     "tick": "tick", "buttons": "buttons", "fresh": "fresh", "energy": "energy_j", "damped": "damped_j", "phase": "phase",
@@ -26,6 +27,7 @@ _NUMBERS = {
     "ahead": "ahead_m", "ahead_tissue": "ahead_tissue", "ahead_speed": "ahead_m_s", "fired": "fired", "faulted": "faulted",
     "events": "events", "needle_in_beam": "needle_in_beam_m", "tip_in_beam": "tip_in_beam",
 }
+_STRUCTURES = {"distance": "distance_{}_m", "ahead_distance": "ahead_{}_m"}
 _MOVES = ("probe_press_m", "probe_slide_m", "probe_sweep_m", "probe_rock_rad", "probe_tilt_rad", "probe_turn_rad")
 
 
@@ -34,7 +36,7 @@ def columns_of(ticks: NDArray[np.void], structures: list[str] | None = None) -> 
 
     Args:
         ticks: what Session.run() or Record.ticks gives.
-        structures: names for the columns of distances; default: their numbers.
+        structures: names for the columns of distances; default: their numbers, as in a record's own table.
     """
     out = {}
     for field in ticks.dtype.names:
@@ -44,10 +46,10 @@ def columns_of(ticks: NDArray[np.void], structures: list[str] | None = None) -> 
         elif field == "probe_move":
             for i, name in enumerate(_MOVES):
                 out[name] = ticks[field][:, i]
-        elif field == "distance":
-            for i in range(ticks["distance"].shape[1]):
+        elif field in _STRUCTURES:
+            for i in range(ticks[field].shape[1]):
                 name = structures[i] if structures is not None else i
-                out[f"distance_{name}_m"] = ticks["distance"][:, i]
+                out[_STRUCTURES[field].format(name)] = ticks[field][:, i]
         else:
             out[_NUMBERS[field]] = ticks[field]
     return out
@@ -116,7 +118,15 @@ class Record:
         return {"poses": self.poses, "buttons": self.ticks["buttons"], "fresh": self.ticks["fresh"]}
 
     def to_dict(self) -> dict[str, NDArray[Any]]:
-        """Arrays of n by the names that the columns have in the file, events as a bit mask."""
+        """Arrays of n by the names of the columns of the file's table of ticks (docs/record.md), but that
+
+        - distances have the structure's name: distance_tumour_m, ahead_tumour_m for distance_0_m, ahead_0_m,
+        - phase and warning are numbers of PHASES and WARNINGS, where the file has the words,
+        - -1 stands for no structure (nearest_vital, warned), where the file has NULL,
+        - `events` is a column here, with bit k for kind k of EVENTS, and a table there,
+        - the columns of the probe are there without a probe, too,
+        - times of tasks (h2_us, ..) are left out.
+        """
         return columns_of(self.ticks, self.info["structures"])
 
     def to_dataframe(self) -> pandas.DataFrame:

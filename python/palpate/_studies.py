@@ -25,14 +25,21 @@ def accuracy(file: str | os.PathLike[str] | None = None, *, command: str | os.Pa
     from . import Error
 
     if file is not None:
-        source, text = file, pathlib.Path(file).read_bytes()
+        source = file
+        try:
+            text = pathlib.Path(file).read_bytes()
+        except OSError as error:
+            raise Error(f"{file}: {error.strerror}: give what `palpate accuracy --json` wrote") from None
     else:
         program = command or shutil.which("palpate")
         if program is None:
             raise Error("accuracy: there is no program palpate in PATH: install it, or say where with command=")
-        done = subprocess.run([os.fspath(program), "accuracy", "--json", "-"], capture_output=True, text=True)
+        try:
+            done = subprocess.run([os.fspath(program), "accuracy", "--json", "-"], capture_output=True)
+        except OSError as error:
+            raise Error(f"{program}: {error.strerror}: say with command= where the program palpate is") from None
         if done.returncode != 0:
-            raise Error(done.stderr.strip() or f"palpate accuracy: exit status {done.returncode}")
+            raise Error(done.stderr.decode(errors="replace").strip() or f"palpate accuracy: exit status {done.returncode}")
         source, text = f"{program} accuracy", done.stdout
     try:
         figures = json.loads(text)

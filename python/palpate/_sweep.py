@@ -3,6 +3,7 @@
 import collections.abc
 import csv
 import json
+import operator
 import os
 import pathlib
 import re
@@ -70,12 +71,19 @@ class SweepResult:
     Attributes:
         folder: of the sweep, with table.csv and table.db (pathlib.Path).
         rows: list of dictionaries, one per case in order; what there is none of is None.
+
+    Raises:
+        palpate.Error: the folder has no table.
     """
 
     def __init__(self, folder):
         self.folder = pathlib.Path(folder)
-        with open(self.folder / "table.csv", newline="", encoding="utf-8") as text:
-            self.rows = [{k: _number(v) for k, v in row.items()} for row in csv.DictReader(text)]
+        table = self.folder / "table.csv"
+        try:
+            with open(table, newline="", encoding="utf-8") as text:
+                self.rows = [{k: _number(v) for k, v in row.items()} for row in csv.DictReader(text)]
+        except OSError as error:
+            raise Error(f"{table}: {error.strerror}: give the folder of a sweep that has run") from None
 
     def __len__(self):
         return len(self.rows)
@@ -109,13 +117,30 @@ def _number(text):
     return float(text) if number[1] or number[2] else int(text)
 
 
-def _work(folder, plan, jobs, retry, progress):
+def _in_python(message):
+    """What the program says, with the arguments of Python for its options."""
+    return message.replace("add --any-build", "give any_build=True").replace("give their folders after --merge", "give their folders")
+
+
+def _jobs(jobs):
+    if jobs is None:
+        return os.cpu_count() or 1
+    try:
+        number = operator.index(jobs)
+    except TypeError:
+        raise TypeError(f"sweep: jobs: give a whole number, not {jobs!r}") from None
+    if number < 1:
+        raise ValueError(f"sweep: jobs: give 1 or more, not {number}")
+    return number
+
+
+def _work(folder, plan, progress, **job):
     """Runs the sweep in a process of its own, which forks: this one may have threads."""
     package = pathlib.Path(__file__).resolve().parent
     environment = dict(os.environ, OPENBLAS_NUM_THREADS="1")
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, (str(package.parent), os.environ.get("PYTHONPATH"))))
-    job = json.dumps({"folder": os.fspath(folder), "plan": plan, "jobs": jobs, "retry": retry})
-    worker = subprocess.Popen([sys.executable, "-m", "palpate._sweep_worker", job], stdout=subprocess.PIPE, text=True,
+    text = json.dumps({"folder": os.fspath(folder), "plan": plan, **job})
+    worker = subprocess.Popen([sys.executable, "-m", "palpate._sweep_worker", text], stdout=subprocess.PIPE, text=True,
                               env=environment, start_new_session=True)
     last = None
     try:
@@ -131,12 +156,12 @@ def _work(folder, plan, jobs, retry, progress):
         worker.stdout.close()
     status = worker.wait()
     if last is not None and "error" in last:
-        raise Error(last["error"])
+        raise Error(_in_python(last["error"]))
     if status != 0:
         raise Error(f"sweep: the process that runs the cases ended with status {status}")
 
 
-def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, progress=None, **options):
+def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, any_build=False, progress=None, **options):
     """Runs the cases of a plan on this machine and gives their table.
 
         palpate.sweep("palpation", folder="palpation")                            # a ready plan, or a plan file
@@ -150,6 +175,7 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, progress=Non
             files, which stays.
         jobs: processes, one core each; default: all cores. The table does not depend on it.
         retry: run cases that failed again.
+        any_build: go on with cases of another build; the table names that of each case.
         progress: called with (done, of) now and then.
         options: with `cases`: procedure ("press", "needle", "session", or a dict with its keys), outputs, repeats, seed,
             set (keys of every case), reference (keys that differ in the case that each is compared with), records.
@@ -159,9 +185,11 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, progress=Non
 
     Raises:
         palpate.Error: a key or value is wrong (before the first case runs), or another run holds the folder.
+        TypeError, ValueError: jobs is no whole number, or below 1.
         KeyboardInterrupt: the rows of the finished cases are in the folder; the same call goes on.
     """
     _need_sweeps()
+    jobs = _jobs(jobs)
     folder = pathlib.Path(tempfile.mkdtemp(prefix="palpate-sweep-") if folder is None else folder)
     given = os.fspath(plan)
     written = None
@@ -180,7 +208,7 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, progress=Non
     elif options:
         raise TypeError(f"sweep() takes {', '.join(options)} only with cases")
     try:
-        _work(folder, given, jobs or os.cpu_count() or 1, retry, progress)
+        _work(folder, given, progress, jobs=jobs, retry=bool(retry), any_build=bool(any_build))
     finally:
         if written is not None:
             os.unlink(written)
@@ -193,16 +221,23 @@ def _scene_path(scene):
     return os.path.abspath(name) if os.path.exists(name) and name not in _palpate.scenes() else name
 
 
-def merge(folder, shards=()):
+def merge(folder, shards=(), *, any_build=False):
     """Takes what shards of a sweep have done into one table: `palpate sweep -o FOLDER --merge SHARDS` does the same.
 
     Args:
         folder: of the sweep; made where it is not there. Shards below FOLDER/shards are found by themselves.
         shards: further folders.
+        any_build: take shards of different builds; the table names that of each case.
 
     Returns:
         SweepResult of the cases that there are.
+
+    Raises:
+        palpate.Error: there are no shards, or they are of another plan or of different builds.
     """
     _need_sweeps()
-    _palpate.merge_shards(os.fspath(folder), [os.fspath(shard) for shard in shards])
+    try:
+        _palpate.merge_shards(os.fspath(folder), [os.fspath(shard) for shard in shards], bool(any_build))
+    except Error as error:
+        raise Error(_in_python(str(error))) from None
     return SweepResult(folder)

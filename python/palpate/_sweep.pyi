@@ -25,6 +25,7 @@ def sweep(
     folder: _Path | None = None,
     jobs: int | None = None,
     retry: bool = False,
+    any_build: bool = False,
     progress: Callable[[int, int], object] | None = None,
     procedure: str | Mapping[str, Any] = "press",
     outputs: Iterable[str] | None = None,
@@ -34,4 +35,4 @@ def sweep(
     reference: Mapping[str, Any] | None = None,
     records: bool = False,
 ) -> SweepResult: ...
-def merge(folder: _Path, shards: Iterable[_Path] = ()) -> SweepResult: ...
+def merge(folder: _Path, shards: Iterable[_Path] = (), *, any_build: bool = False) -> SweepResult: ...

@@ -19,7 +19,7 @@ def main():
         return True
 
     try:
-        _palpate.run_sweep(job["folder"], job["plan"], job["jobs"], job["retry"], told)
+        _palpate.run_sweep(job["folder"], job["plan"], job["jobs"], job["retry"], job["any_build"], told)
     except Error as error:
         print(json.dumps({"error": str(error)}), flush=True)
         return 1

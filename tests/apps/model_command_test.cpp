@@ -168,6 +168,10 @@ TEST(Plan, WhatNothingHoldsEndsOnOneLine)
     EXPECT_EQ(outcome.status, 1);
     EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
     EXPECT_NE(outcome.err.find("the nearest is"), std::string::npos) << outcome.err;
+    const Outcome forced =
+        palpate({"plan", scene, "--error", "80%", "--force-error", "50%", "--budget", "21us", "--speed", "50"});
+    EXPECT_EQ(forced.status, 1);
+    EXPECT_NE(forced.err.find("%, of the force not known, in 20 us"), std::string::npos) << forced.err;
 }
 
 TEST(Plan, WrongQuantitiesAreRefused)

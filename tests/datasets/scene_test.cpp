@@ -167,6 +167,19 @@ TEST(Scene, GravityOfAnySceneComesBack)
     EXPECT_FALSE(parseScene("[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n", origin).gravity.given);
 }
 
+// Tables have a column for each by its name.
+TEST(Scene, TargetAndVitalStructuresHaveNamesOfTheirOwn)
+{
+    const std::string head = "[volume]\nphantom = \"layered\"\n[target]\nstructure = \"tumour\"\n";
+    const std::string bone = "[[vital]]\nname = \"bone\"\n", tumour = "[[vital]]\nname = \"tumour\"\n";
+    EXPECT_EQ(errorOf(head + bone), "no error");
+    EXPECT_EQ(errorOf(head + bone + tumour),
+              "/data/scenes/full.toml:4: [target] structure = \"tumour\": is in [[vital]] too: leave one of them out");
+    EXPECT_EQ(errorOf(head + bone + bone),
+              "/data/scenes/full.toml:8: [[vital]] name = \"bone\": is in another [[vital]] too: leave one of them out");
+    EXPECT_EQ(parseRecordedScene(head + bone + bone + tumour, origin).vital.size(), 3U);
+}
+
 TEST(Scene, GravityIsRefusedWhereItSaysTooLittleOrTooMuch)
 {
     const std::string scene = "[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n[gravity]\n";

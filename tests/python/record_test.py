@@ -1,10 +1,13 @@
+import contextlib
+import sqlite3
 import threading
 import unittest
 
 import numpy as np
+import pandas
 
 import palpate
-from common import InFolder, figures, small_block, wander
+from common import InFolder, figures, program, small_block, wander
 
 
 class Records(InFolder):
@@ -28,6 +31,20 @@ class Records(InFolder):
         np.testing.assert_array_equal(again.run(**record.samples), record.ticks)
         self.assertEqual(again.force_hash, self.hash)
 
+    def test_a_record_of_another_rate_runs_and_is_recorded_at_its_rate(self):
+        file, again = self.folder / "p500.db", self.folder / "again.db"
+        program("stability", "--case", "plate-1mm/spring/touch/grip/500", "--record", file)
+        record = palpate.Record(file)
+        model = record.model()
+        self.assertEqual(model.rate, 500)
+        with palpate.Session(model, record=again) as session:
+            np.testing.assert_array_equal(session.run(**record.samples), record.ticks)
+            self.assertEqual(session.force_hash, record.replay()["force_hash"])
+            with self.assertRaisesRegex(palpate.Error, "500 Hz"):
+                session.perform()
+        self.assertEqual(palpate.Record(again).info["rate"], 500)
+        self.assertTrue(palpate.Record(again).replay()["identical"])
+
     def test_a_probe_s_moves_are_part_of_its_poses(self):
         file = self.folder / "p.db"
         scene = palpate.Scene.parse(palpate.Scene("block").changed({"volume.voxel_mm": 3, "model.setting": "fast"}).text + """
@@ -50,6 +67,27 @@ lateral = [1, 0, 0]
         self.assertEqual(record.poses.shape, (600, 12))
         np.testing.assert_array_equal(palpate.Session(record.model()).run(**record.samples), record.ticks)
         self.assertIn("probe_press_m", record.to_dict())
+        self.check_columns(file)
+
+    def check_columns(self, file):
+        """Every column of the file's own table is one of to_dict(), with the same values, as its documentation says."""
+        record = palpate.Record(file)
+        ours = record.to_dict()
+        with contextlib.closing(sqlite3.connect(file)) as database:
+            theirs = pandas.read_sql("SELECT * FROM ticks", database)
+        for i, name in enumerate(record.info["structures"]):
+            theirs = theirs.rename(columns={f"{what}_{i}_m": f"{what}_{name}_m" for what in ("distance", "ahead")})
+        kept = [column for column in theirs if not column.endswith("_us") and column != "seconds"]
+        self.assertEqual(set(kept) - set(ours), set())
+        for column in kept:
+            values = theirs[column].fillna(-1) if column in ("nearest_vital", "warned") else theirs[column]
+            if column in ("phase", "warning"):
+                values = values.map({"phase": palpate.PHASES, "warning": palpate.WARNINGS}[column].index)
+            np.testing.assert_array_equal(ours[column], values.to_numpy(), column)
+        self.assertEqual({column for column in set(ours) - set(kept) if "probe" not in column and "beam" not in column}, {"events"})
+
+    def test_columns_are_those_of_the_file(self):
+        self.check_columns(self.file)
 
     def test_replay_and_score_are_the_program_s(self):
         record = palpate.Record(self.file)

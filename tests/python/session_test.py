@@ -87,6 +87,21 @@ class Run(InFolder):
                 with self.subTest(name, wrong=wrong), self.assertRaisesRegex(ValueError, "finite"):
                     palpate.press_path((0, 0, 0), (0, 1, 0), 1e-3, **{name: wrong})
 
+    def test_a_path_of_what_is_no_point_is_refused(self):
+        for name in ("start", "direction"):
+            for wrong in ([1], [1, 2], [[0, 1, 0]], np.zeros((3, 1)), 1.0, None, "abc", np.zeros(3, complex), [1, [2], 3]):
+                arguments = {"start": (0, 0, 0), "direction": (0, 1, 0), "depth": 1e-3, name: wrong}
+                with self.subTest(arguments), self.assertRaisesRegex(ValueError, f"^{name}: give three numbers"):
+                    palpate.press_path(**arguments)
+            arguments[name] = np.ma.masked_equal([0.0, 1, 0], 1)
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, f"^{name}: is a masked array"):
+                palpate.press_path(**arguments)
+        for name in ("depth", "speed", "hold", "lead"):
+            for wrong in ([1e-3], "1", None):
+                arguments = {"start": (0, 0, 0), "direction": (0, 1, 0), "depth": 1e-3, name: wrong}
+                with self.subTest(arguments), self.assertRaisesRegex(ValueError, f"^{name}: give one number"):
+                    palpate.press_path(**arguments)
+
     def test_bad_arguments_are_refused_and_change_nothing(self):
         session = palpate.Session(small_block())
         for wrong, call in [
@@ -128,7 +143,7 @@ class Shape(unittest.TestCase):
             value = getattr(tick, field)
             if field in words:
                 value = words[field].index(value)
-            elif field == "distance":
+            elif field in ("distance", "ahead_distance"):
                 value = value[:len(row[field])]
             np.testing.assert_array_equal(value, row[field], field)
 
@@ -172,6 +187,59 @@ class Shape(unittest.TestCase):
         elsewhere = session.ultrasound(320, 320, face=[0.01, 0, 0])
         self.assertGreater(np.count_nonzero(elsewhere["pixels"] != pictures[0]["pixels"]), 1000)
 
+    def test_a_small_picture_shows_the_body_too(self):
+        session = palpate.Session(small_block())
+        session.run(wander(10))
+        for side in (64, 84):
+            pixels = session.ultrasound(side, side)["pixels"]
+            self.assertGreater(np.count_nonzero(pixels), 0.8 * side * side)
+            self.assertGreater(pixels.std(), 10)
+
+    def check_places(self, probe):
+        """Pixels are the lines at the places that the documentation gives."""
+        session = palpate.Session(palpate.Scene.parse(small_block().scene.text + probe))
+        session.run(wander(10))
+        picture = session.ultrasound(200, 260, face=[0, 0, 0])
+        lines, (height, width) = picture["lines"].astype(float), picture["pixels"].shape
+        samples, count = lines.shape
+        column, row = np.meshgrid(np.arange(width), np.arange(height))
+        lateral = (width / 2 - column - 0.5) * picture["metres_per_pixel"]
+        axial = (row + 0.5) * picture["metres_per_pixel"] + picture["top"]
+        angle, depth, radius = lateral, axial, picture["radius"]
+        if radius > 0:
+            angle, depth = np.arctan2(lateral, radius + axial), np.hypot(lateral, radius + axial) - radius
+        i = angle / picture["line_pitch"] + (count - 1) / 2
+        k = depth * samples / picture["depth"] - 0.5
+        inside = (i > 0.01) & (i < count - 1.01) & (k > 0.01) & (k < samples - 1.01)
+        self.assertGreater(np.count_nonzero(inside), 0.3 * inside.size)
+        i, k = i[inside], k[inside]
+        at, below, u, v = i.astype(int), k.astype(int), i % 1, k % 1
+        between = (1 - v) * ((1 - u) * lines[below, at] + u * lines[below, at + 1]) \
+            + v * ((1 - u) * lines[below + 1, at] + u * lines[below + 1, at + 1])
+        self.assertLess(np.abs(between - picture["pixels"][inside]).max(), 5)
+        self.assertLess(np.abs(between - picture["pixels"][inside]).mean(), 1)
+        return session, picture
+
+    def test_pixels_are_where_the_documentation_says(self):
+        session, picture = self.check_places("")
+        self.assertEqual(picture["radius"], 0)
+        # The probe goes 20 columns towards its marked side: what is in the body goes to the right.
+        moved = session.ultrasound(200, 260, face=[20 * picture["metres_per_pixel"], 0, 0])["pixels"]
+        middle = slice(60, 140)
+        there = picture["pixels"][60:200, middle].ravel()
+        right, left = (np.corrcoef(there, np.roll(moved, -shift, axis=1)[60:200, middle].ravel())[0, 1] for shift in (20, -20))
+        self.assertGreater(right, left + 0.2)
+
+    def test_pixels_of_a_curved_probe_are_where_the_documentation_says(self):
+        _, picture = self.check_places("""
+[probe]
+kind = "curved"
+face_mm = [0, 0, 0]
+direction = [0, 1, 0]
+lateral = [1, 0, 0]
+""")
+        self.assertGreater(picture["radius"], 0)
+        self.assertLess(picture["top"], 0)
 
     def test_the_first_picture_is_where_the_scene_has_the_probe(self):
         session = palpate.Session(palpate.Scene("us-core-biopsy").changed({"model.setting": "fast", "volume.voxel_mm": 2}))

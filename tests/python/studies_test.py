@@ -1,5 +1,6 @@
 import json
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +23,15 @@ SMALL = {
 def sweep(folder, cases, **options):
     return palpate.sweep("block", cases, folder=folder, jobs=2, procedure={"kind": "press", "depth_mm": 3}, set=SMALL,
                          outputs=["force_n"], **options)
+
+
+def as_another_build(file):
+    """The file of a case, as if another build had written it."""
+    text = re.sub('"build":"[^"]*"', '"build":"palpate 0.0"', file.read_text().strip())
+    checked = 0xcbf29ce484222325  # FNV-1a of what is without its checksum
+    for byte in re.sub('"checksum":"[^"]*",', "", text).encode():
+        checked = (checked ^ byte) * 0x100000001b3 % 2**64
+    file.write_text(re.sub('"checksum":"[^"]*"', f'"checksum":"{checked:016x}"', text))
 
 
 class Sweeps(InFolder):
@@ -70,6 +80,31 @@ class Sweeps(InFolder):
         with self.assertRaisesRegex(palpate.Error, "no cases"):
             sweep(self.folder / "u", [])
 
+    def test_a_number_of_processes_that_is_none_is_refused_before_anything_begins(self):
+        for wrong in (2.5, "2"):
+            with self.subTest(wrong), self.assertRaisesRegex(TypeError, "jobs: give a whole number"):
+                palpate.sweep("block", self.cases, folder=self.folder / "s", jobs=wrong)
+        with self.assertRaisesRegex(ValueError, "jobs: give 1 or more"):
+            palpate.sweep("block", self.cases, folder=self.folder / "s", jobs=0)
+        self.assertFalse((self.folder / "s").exists())
+
+    def test_cases_of_another_build_are_taken_where_that_is_asked_for(self):
+        place = self.folder / "s"
+        sweep(place, self.cases)
+        (place / "cases" / "000" / "0.json").unlink()
+        for number in (1, 2):
+            file = place / "cases" / "000" / f"{number}.json"
+            as_another_build(file)
+        with self.assertRaisesRegex(palpate.Error, "give any_build=True"):
+            sweep(place, self.cases)
+        self.assertEqual(len(sweep(place, self.cases, any_build=True)), 3)
+        with self.assertRaisesRegex(palpate.Error, "give any_build=True"):
+            palpate.merge(self.folder / "all", [place])
+        merged = palpate.merge(self.folder / "all", [place], any_build=True)
+        self.assertEqual(merged["force_n"], palpate.SweepResult(place)["force_n"])
+        with self.assertRaisesRegex(palpate.Error, "give their folders$"):
+            palpate.merge(self.folder / "none")
+
     def test_an_interrupt_keeps_what_is_done(self):
         script = self.folder / "long.py"
         script.write_text(
@@ -100,7 +135,7 @@ class Sweeps(InFolder):
         self.assertIn("force_n", palpate.sweep_outputs()["press"])
 
 
-class Plans(unittest.TestCase):
+class Plans(InFolder):
     def test_a_plan_is_that_of_the_program(self):
         smaller = {"width_mm": 27, "thickness_mm": 18, "tumour_centre_mm": 9, "tumour_diameter_mm": 6}
         keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {
@@ -115,6 +150,20 @@ class Plans(unittest.TestCase):
         for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 palpate.plan(scene, **wrong)
+        with self.assertRaisesRegex(palpate.Error, "^budget: 1 us: "):
+            palpate.plan(scene, budget=1e-6)
+        with self.assertRaisesRegex(palpate.Error, "none.json: .*palpate bench costs"):
+            palpate.plan(scene, costs="none.json")
+        slow = {"slot_ns": 20, "slot_cycle_ns": 90, "contact_ns": 600, "contact_cycle_ns": 1500}
+        file = self.folder / "costs.json"
+        file.write_text(json.dumps({"small": slow, "finite": slow}))
+        dear = palpate.plan(scene, error=0.25, budget=1e-3, costs=file)
+        self.assertEqual(dear["costs"], str(file))
+        self.assertEqual(ours["costs"], "built in")
+        times = [{(c["level"], c["spacing_mm"], *c["windows"], c["sweeps"], c["strain"]): c["predicted_us"] for c in plan["candidates"]
+                  if c["level"] == "elastic"} for plan in (ours, dear)]
+        self.assertEqual(times[0].keys(), times[1].keys())
+        self.assertTrue(all(times[1][c] > times[0][c] for c in times[0]))
 
 
 class Accuracy(InFolder):
@@ -136,6 +185,14 @@ class Accuracy(InFolder):
             other.chmod(0o755)
             with self.subTest(says), self.assertRaisesRegex(palpate.Error, error):
                 palpate.accuracy(command=other)
+
+    def test_what_is_not_there_is_an_error_of_palpate(self):
+        with self.assertRaisesRegex(palpate.Error, "^/none: .*command="):
+            palpate.accuracy(command="/none")
+        with self.assertRaisesRegex(palpate.Error, "^/none.json: "):
+            palpate.accuracy("/none.json")
+        with self.assertRaisesRegex(palpate.Error, "^/none/table.csv: "):
+            palpate.SweepResult("/none")
 
 
 if __name__ == "__main__":

@@ -102,6 +102,23 @@ class Shards(InFolder):
         said = refused("sweep", "-o", self.folder / "a", "--merge", self.folder / "b" / "shards" / "cases-1")
         self.assertIn("another plan", said)
 
+    def test_a_part_of_failed_cases_warns_and_the_merge_is_reached(self):
+        parts, alone = self.folder / "parts", self.folder / "alone"
+        key = "volume.parameters.tumour_centre_mm"
+        text = PLAN.replace("[2, 4, 8]", "[2]").replace("procedure.speed_mm_s", key).replace(f"\n{key} = 18", "")
+        self.plan.write_text(text.replace("[10, 20, 40]", "[18, 35]"))  # at 35 mm the lump is not inside the body
+        for k in (1, 2):
+            done = subprocess.run([PROGRAM, "sweep", self.plan, "-o", parts, "--shard", f"{k}/2", "--jobs", "1"],
+                                  capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual("palpate: every case failed: " in done.stderr, k == 2, done.stderr)
+        self.assertIn("4 of 4 cases, 2 failed", program("sweep", "-o", parts, "--merge"))
+        self.plan.write_text(text.replace("[10, 20, 40]", "[35]"))
+        self.assertIn("every case failed", refused("sweep", self.plan, "-o", alone, "--jobs", 1))
+        for k in (1, 2):
+            program("sweep", self.plan, "-o", parts / "failed", "--shard", f"{k}/2", "--jobs", 1)
+        self.assertIn("every case failed", refused("sweep", "-o", parts / "failed", "--merge"))
+
     def test_wrong_parts_are_refused(self):
         for wrong, arguments in [
             ("part K of N", ["--shard", "0/7"]), ("part K of N", ["--shard", "8/7"]), ("part K of N", ["--shard", "x"]),
@@ -145,6 +162,22 @@ class Managers(Managed):
     def test_dask(self):
         shutil.copy(SOURCE / "examples" / "sweeps" / "dask_sweep.py", self.folder)
         self.run_here("/usr/bin/python3", "dask_sweep.py", "lump.toml", "lump", "--shards", "3")
+
+    def test_dask_s_workers_may_be_in_another_folder(self):
+        elsewhere = self.folder / "elsewhere"
+        elsewhere.mkdir()
+        cluster = subprocess.Popen(["/usr/bin/python3", "-c", """if __name__ == "__main__":
+    from dask.distributed import LocalCluster
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1") as cluster:
+        print(cluster.scheduler_address, flush=True)
+        input()
+"""], cwd=elsewhere, env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        with cluster:
+            address = cluster.stdout.readline().strip()
+            self.assertRegex(address, "^tcp://")
+            self.run_here("/usr/bin/python3", SOURCE / "examples" / "sweeps" / "dask_sweep.py", "lump.toml", "lump",
+                          "--shards", "2", "--scheduler", address)
+            cluster.communicate("\n")
 
     def test_dask_says_which_part_failed_and_why(self):
         script = SOURCE / "examples" / "sweeps" / "dask_sweep.py"

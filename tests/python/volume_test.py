@@ -151,6 +151,14 @@ class Files(InFolder):
             self.assertEqual(one.file, str(self.folder / "v.vdb"))
             self.assertEqual(palpate.Scene.for_volume(one).to_dict()["volume"]["file"], str(self.folder / "v.vdb"))
 
+    def test_a_volume_is_saved_under_the_name_of_a_volume_alone(self):
+        volume = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES)
+        for name in ("lump", "lump.nii", "lump.vdb.gz"):
+            with self.subTest(name), self.assertRaisesRegex(palpate.Error, f"{name}: a volume is a .vdb file"):
+                volume.save(self.folder / name)
+        self.assertEqual(list(self.folder.iterdir()), [])
+        self.assertIsNone(volume.file)
+
     def test_a_phantom_is_that_of_the_program(self):
         program("phantom", "layered", "--voxel", "3", "-o", self.folder / "p.vdb")
         theirs = palpate.Volume.open(self.folder / "p.vdb")

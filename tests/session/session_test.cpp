@@ -40,6 +40,18 @@ TEST_F(SessionTest, AFalconThatNothingOpensIsRefused)
     EXPECT_THROW(openDevice(model(), request, nullptr), std::runtime_error);
 }
 
+TEST(Open, AnotherTargetIsNoVitalStructureAnyMore)
+{
+    SceneChanges changes;
+    changes.model = "spring";
+    changes.target = "artery";
+    const haptics::SessionModel model = openSession("near-vessel", changes);
+    EXPECT_EQ(model.scene.target, "artery");
+    ASSERT_EQ(model.scene.vital.size(), 2U);
+    EXPECT_EQ(model.scene.vital[0].name, "vein");
+    EXPECT_EQ(reopenSession("r.db", describeSession(model, "near-vessel", "hand")).scene.vital.size(), 2U);
+}
+
 constexpr double length = 4.0;  // the scripted hand has punctured and fired by then [s]
 
 // The poses of a device's session, handed in one by one, give the same session: each bit of each force, and all figures.

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -273,6 +274,33 @@ TEST(Layout, PixelAndPointAreInverse)
             EXPECT_NEAR(q.x, 123.5, 1e-3);
             EXPECT_NEAR(q.y, 456.5, 1e-3);
         }
+}
+
+TEST(Layout, WithoutMarginsThePictureReachesTheBordersThatLimitIt)
+{
+    for (const Transducer& probe : {linearProbe(), curvedProbe()}) {
+        const Beam beam(probe, settingsOf(probe));
+        const Layout wide(beam, 6400, 64, false, {0, 0}), high(beam, 64, 6400, false, {0, 0});
+        EXPECT_NEAR(wide.pixel(0, beam.top()).y, 0, 1e-3);
+        EXPECT_NEAR(wide.pixel(0, beam.settings().depth).y, 64, 1e-3);
+        EXPECT_NEAR(high.pixel(beam.halfWidth(), 0).x, 0, 1e-3);
+        EXPECT_NEAR(high.pixel(-beam.halfWidth(), 0).x, 64, 1e-3);
+    }
+}
+
+// Of 64 pixels the usual margins leave none.
+TEST(ScanConverter, WithoutMarginsASmallPictureIsFull)
+{
+    BeamImage image;
+    image.settings = settingsOf(image.transducer);
+    image.grey.assign(static_cast<std::size_t>(image.settings.lines) * static_cast<std::size_t>(image.settings.samples),
+                      99);
+    Pixels small, framed;
+    ScanConverter({0, 0}).convert(image, 64, 64, small);
+    ScanConverter().convert(image, 64, 64, framed);
+    // The face is 38 mm wide and the picture 40 mm deep: 95 % of the columns.
+    EXPECT_NEAR(static_cast<double>(std::ranges::count(small.grey, 99)) / (64 * 64), 0.95, 0.04);
+    EXPECT_LT(std::ranges::count(framed.grey, 99), 10);
 }
 
 // The picture's plane holds the line, the aim is in the picture, and the face lies on the skin.
