@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
 namespace palpate::render {
 namespace {
@@ -235,7 +236,11 @@ void ToolPicture::leaveTrail(const channel::State& state, const Recorded* record
 {
     if (recorded == nullptr)
         way_.add(state);
-    setLine(*trail_, recorded != nullptr ? recorded->wayUntil(state.time) : way_.until());
+    auto way = recorded != nullptr ? recorded->wayUntil(state.time) : way_.until();
+    if (way == shownWay_)
+        return;  // its tube is not made anew for every picture
+    setLine(*trail_, way);
+    shownWay_ = std::move(way);
 }
 
 // The notch takes its core at the end of the throw: from the tip to there the inner needle is out.

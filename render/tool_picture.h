@@ -65,8 +65,9 @@ private:
     std::array<vtkNew<vtkActor>, channel::maxMarks> marks_;
     vtkNew<vtkPolyData> thrown_;  // the inner needle while it is out [mm]
     std::uint32_t fired_ = 0;
-    double firedAt_ = -1;  // [s]; negative: not lately
-    TipWay way_;           // of a session that runs
+    double firedAt_ = -1;               // [s]; negative: not lately
+    TipWay way_;                        // of a session that runs
+    std::vector<glm::dvec3> shownWay_;  // [m]
 };
 
 }  // namespace palpate::render
