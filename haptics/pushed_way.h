@@ -13,6 +13,7 @@ namespace palpate::haptics {
 /// Not in it: others that touch the body only later, and that another place of the skin is pressed later.
 class PushedWay {
 public:
+    /// @param body    as the others have displaced it
     /// @param entry   on the skin, at rest [m]
     /// @param axis    of the needle, unit vector into the body
     /// @param others  size of the others' force [N]; 0: nothing is displaced by them
