@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/end_in_order.h>
 #include <base/error.h>
+#include <base/outputs.h>
 #include <base/quantiles.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -11,6 +12,7 @@
 
 #include <haptics/falcon/buttons.h>
 #include <haptics/falcon/force_test.h>
+#include <haptics/falcon/guardian.h>
 #include <haptics/falcon/usb.h>
 
 #include <fmt/format.h>
@@ -30,6 +32,7 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace palpate::apps {
@@ -50,10 +53,10 @@ struct DevicesArguments {
     std::string json;
 };
 
-// What a look at the Falcon itself shows.
+// What a look at the Falcon itself shows; nothing of what was not asked.
 struct State {
-    bool running = false, homed = false;
-    std::string problem;  // why it could not be looked at; empty: it could
+    std::optional<bool> running, homed;
+    std::string problem;  // why it could not be looked at; empty: it could, or nobody tried
 };
 
 struct Exchanges {
@@ -106,7 +109,9 @@ State look()
         state.running = true;
         state.homed = link.reading().homed == falcon::allHomed;
     } catch (const falcon::Trouble& trouble) {
-        if (trouble.cause() != falcon::Cause::firmwareFile) {
+        if (trouble.cause() == falcon::Cause::firmwareFile) {
+            state.running = state.homed = false;
+        } else {
             state.problem = trouble.what();
         }
     }
@@ -142,15 +147,26 @@ Exchanges exchange(const DevicesArguments& o)
     return done;
 }
 
-// A push of 1 N, to be felt.
+void failIfInterrupted()
+{
+    if (const int signal = base::EndInOrder::signal(); signal != 0) {
+        throw command::Interrupted(signal, "interrupted");
+    }
+}
+
+// A push of 1 N, to be felt. However this program ends meanwhile, no torque is left.
 nlohmann::json pushOnce(const DevicesArguments& o)
 {
+    falcon::Guardian guardian;
+    const base::EndInOrder untilItsEnd;
     const auto wire = falcon::usbTransport();
     falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
-    const std::atomic<bool> never{false};
-    link.connect(never);
-    const falcon::ForceTest test = falcon::testForce(link, *wire, session::sayForFalcon, never);
+    link.connect(base::EndInOrder::asked());
+    guardian.guard(wire->descriptor());
+    const auto test = falcon::testForce(link, *wire, session::sayForFalcon, base::EndInOrder::asked(), guardian);
+    guardian.guard(-1);
     link.close();
+    failIfInterrupted();
     if (o.json != "-") {
         fmt::print("force test        {}\n", falcon::inWords(test));
     }
@@ -187,6 +203,11 @@ void printExchanges(const Exchanges& e)
     }
 }
 
+nlohmann::json jsonOf(std::optional<bool> known)
+{
+    return known ? nlohmann::json(*known) : nlohmann::json(nullptr);
+}
+
 nlohmann::json list(const DevicesArguments& o)
 {
     const bool quiet = o.json == "-";
@@ -195,7 +216,8 @@ nlohmann::json list(const DevicesArguments& o)
     auto figures = nlohmann::json::array();
     for (const auto& f : falcons) {
         // With the options for an exchange that follows, the look would only take time.
-        const State state = f.allowed && f.driver.empty() && o.exchanges == 0 && !o.forceTest ? look() : State{};
+        const bool looked = f.allowed && f.driver.empty() && o.exchanges == 0 && !o.forceTest;
+        const State state = looked ? look() : State{};
         say(fmt::format("Novint Falcon on bus {}, address {}", f.bus, f.address));
         say(fmt::format("  may be opened   {}",
                         f.allowed ? "yes" : "no: run 'sudo palpate devices --install-udev', plug it in again"));
@@ -203,18 +225,19 @@ nlohmann::json list(const DevicesArguments& o)
                         f.driver.empty() ? "none" : f.driver + " (is detached when the Falcon is used)"));
         if (!state.problem.empty()) {
             say("  firmware        cannot be asked: " + state.problem);
-        } else if (f.allowed && f.driver.empty() && o.exchanges == 0 && !o.forceTest) {
-            say(fmt::format("  firmware        {}", !state.running ? "not loaded: give it with --falcon-firmware FILE"
-                                                    : state.homed  ? "runs, homed"
-                                                                   : "runs, not homed yet"));
+        } else if (looked) {
+            say(fmt::format("  firmware        {}", !*state.running ? "not loaded: give it with --falcon-firmware FILE"
+                                                    : *state.homed  ? "runs, homed"
+                                                                    : "runs, not homed yet"));
         }
         figures.push_back({{"bus", f.bus},
                            {"address", f.address},
                            {"node", f.node},
                            {"kernel_driver", f.driver},
                            {"allowed", f.allowed},
-                           {"firmware_runs", state.running},
-                           {"homed", state.homed}});
+                           {"firmware_runs", jsonOf(state.running)},
+                           {"homed", jsonOf(state.homed)},
+                           {"problem", state.problem}});
     }
     if (falcons.empty()) {
         say("no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
@@ -273,9 +296,7 @@ void printButtons(const session::FalconOptions& options)
         timespec pause{betweenLooks, 0};
         ended() ? 0 : ::nanosleep(&pause, nullptr);
     }
-    if (const int signal = base::EndInOrder::signal(); signal != 0) {
-        throw command::Interrupted(signal, "interrupted");
-    }
+    failIfInterrupted();
 }
 
 void devices(const DevicesArguments& o)
@@ -288,6 +309,7 @@ void devices(const DevicesArguments& o)
         printButtons(o.falcon);
         return;
     }
+    base::checkOutput(o.json);
     auto figures = list(o);
     if (o.exchanges > 0) {
         const Exchanges done = exchange(o);
@@ -309,12 +331,14 @@ void addDevices(CLI::App& app)
     const auto o = std::make_shared<DevicesArguments>();
     CLI::App* c = app.add_subcommand("devices", "List haptic devices, and what is missing to use them");
     c->add_option("--falcon-firmware", o->falcon.firmware, "Firmware file of the Novint Falcon, from its maker");
-    c->add_option("--exchanges", o->exchanges,
-                  "Exchange this many packets with the Falcon, without force, and print rate and losses")
-        ->check(CLI::Range(1, 10000000));
+    auto* const exchanges =
+        c->add_option("--exchanges", o->exchanges,
+                      "Exchange this many packets with the Falcon, without force, and print rate and losses")
+            ->check(CLI::Range(1, 10000000));
     auto* const buttons = c->add_flag(
         "--buttons", o->buttons,
         "Print a line for each button pressed at the Falcon's grip, until Ctrl-C; no force; waits for a Falcon");
+    buttons->excludes(exchanges);
     c->add_flag("--force-test", o->forceTest, "Push the Falcon's grip with 1 N, to be felt")->excludes(buttons);
     auto* install = c->add_flag("--install-udev", o->installUdev,
                                 "Write the udev rule that permits access to the Falcon (run as root)");

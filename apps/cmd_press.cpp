@@ -164,7 +164,7 @@ std::string pressTable(const Run& run)
     for (const PressSample& s : run.samples) {
         const Vec3 p = 1e3 * s.pose.position;
         fmt::format_to(
-            out, "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:.10g},{:.1f}",
+            out, "\n{:.13g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:.10g},{:.1f}",
             s.pose.seconds, p.x, p.y, p.z, s.force.x, s.force.y, s.force.z, 1e6 * s.contactArea, 1e3 * s.energy, s.residual,
             1e3 * s.depth, 1e3 * s.behind, 1e6 * s.took);
         for (const Vec3& u : s.displacement) {
@@ -232,19 +232,29 @@ void warnOfCells(const Run& run)
     }
 }
 
-// Such a tool is pushed from the nearest place of the surface, by all its depth at once.
-void warnOfStartInside(const Run& run)
+// Such a tool is there all at once: one whose middle is inside is pushed from the nearest place of the surface, and the
+// first forces of one that touches are of tissue that has not given way yet.
+void warnOfStartInContact(const Run& run)
 {
     const ToolSpec& tool = run.press.tool;
     const studies::ToolPose& first = run.path.poses.front();
     const haptics::ProxyTool shape{tool.radius, tool.pressedLength(), first.axis};
     const double inside = -haptics::deepestPlace(run.model.surface, shape, first.position).distance;
-    if (tool.kind != ToolKind::needle && inside > 0.0) {
+    if (tool.kind == ToolKind::needle || inside <= 5e-5 - tool.radius) {
+        return;
+    }
+    if (inside > 0.0) {
         fmt::print(
             stderr,
             "palpate press: the path begins with the tool's middle {:.1f} mm inside the body: forces have no meaning "
             "until the tool has been outside; start it there\n",
             1e3 * inside);
+    } else {
+        fmt::print(
+            stderr,
+            "palpate press: the path begins with the tool {:.1f} mm in the body: its first forces are too large, until "
+            "the tissue has given way; start it outside\n",
+            1e3 * (inside + tool.radius));
     }
 }
 
@@ -270,7 +280,7 @@ void runPress(const PressArguments& o)
     }
     progress.clear();
     warnOfCells(run);
-    warnOfStartInside(run);
+    warnOfStartInContact(run);
     const auto ticks = static_cast<double>(run.path.ticks());
     try {
         run.summary = studies::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {

@@ -97,10 +97,11 @@ fs::path recordFile(const TrainArguments& o)
     return besideReport ? fs::path(o.report).replace_extension(".db") : fs::path(o.record);
 }
 
-// Pictures of a record are those of its events, on a machine that is busy too, and no viewer is beside the servo loop.
+// Pictures of a record are those of its events, on a machine that is busy too, and no second viewer is beside the servo
+// loop.
 bool drawsLater(const TrainArguments& o)
 {
-    const bool live = wantsWindow(o) || recordFile(o).empty() || session::has(o.faults, session::FaultKind::stallViewer);
+    const bool live = recordFile(o).empty() || session::has(o.faults, session::FaultKind::stallViewer);
     return !o.pictures.empty() && (o.unpaced || !live);
 }
 

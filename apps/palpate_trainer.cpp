@@ -1,5 +1,6 @@
 #include <apps/parsed_program.h>
 #include <base/child_process.h>
+#include <base/end_in_order.h>
 #include <base/error.h>
 #include <base/quantities.h>
 #include <command/json.h>
@@ -80,8 +81,12 @@ void run(Words& w)
     w.options.height = height;
     w.options.programs = palpate::base::programFolder();
     palpate::trainer::SessionFolder sink(w.sessions);
+    const palpate::base::EndInOrder untilItsEnd;
     const WindowFigures figures =
         w.screens ? palpate::trainer::measureScreens(w.options, sink) : palpate::trainer::runWindow(w.options, sink);
+    if (const int signal = palpate::base::EndInOrder::signal(); signal != 0) {
+        throw palpate::command::Interrupted(signal, "interrupted");
+    }
     if (w.screens && w.json != "-") {
         print(figures);
     }

@@ -255,7 +255,7 @@ render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
     render::Ghost ghost;
     other.each([&](const TickRecord& r) {
         if (r.tick % every == 0) {
-            const auto tip = r.device.position + r.deflection;
+            const auto tip = r.tip();
             ghost.push_back({static_cast<double>(r.tick) / other.info().rate,
                              {tip.x, tip.y, tip.z},
                              {r.device.axis.x, r.device.axis.y, r.device.axis.z},

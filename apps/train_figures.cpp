@@ -79,6 +79,8 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
                               {"rounds", model.posture->rounds},
                               {"unloaded_within_mm", 1e3 * model.posture->residual}};
     }
+    figures["steps_down"] = result.stepsDown;
+    figures["model_at_end"] = datasets::modelLevels[static_cast<std::size_t>(result.level)];
     figures["device"] = info.device;
     figures["build"] = info.build;
     figures["contacts"] = result.contacts;

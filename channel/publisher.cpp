@@ -53,7 +53,8 @@ Owner ownerOf(const base::Descriptor& file)
 
 // Removes the segment `name` that is open as `old`. The lock on it lets only one process at a time do so, and the second
 // look at the name keeps a slower one from removing what a faster one has put there. Who does not get the lock leaves it to
-// who has.
+// who has. A publisher shares the lock of its own as long as it lives, so that it goes nowhere, also where its process
+// cannot be seen from here (another container with the same /dev/shm).
 void removeLocked(const base::Descriptor& old, const std::string& name)
 {
     if (::flock(*old, LOCK_EX | LOCK_NB) == 0 && sameFile(old, name))
@@ -71,6 +72,10 @@ void removeLeftBehind(const std::string& session, const std::string& name)
     const std::uint64_t pid = ownerOf(old).pid;
     base::failIf(pid != 0, "session {} is running already (pid {}): end it or choose another --session", session, pid);
     removeLocked(old, name);
+    base::failIf(::flock(*old, LOCK_SH | LOCK_NB) == 0 && sameFile(old, name),
+                 "session {} is running already, out of sight of this process (in another container): end it or choose "
+                 "another --session",
+                 session);
 }
 
 // Whether `file` is the temporary name of a process that is dead.
@@ -160,7 +165,7 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
                       displacements = inputs + aligned(sizeof(InputBlock));
     const std::string temporary = name + "." + std::to_string(::getpid());
     file = base::Descriptor(::shm_open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR));
-    if (!file)
+    if (!file || ::flock(*file, LOCK_SH | LOCK_NB) != 0)
         fail(session, "cannot make shared memory", errno);
     const NameGoes goes{temporary};
     map(displacements + aligned(sizeof(DisplacedBlock)));

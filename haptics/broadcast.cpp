@@ -29,7 +29,7 @@ void showMarks(const TickRecord& r, channel::State& state) noexcept
     const std::uint32_t pressed = held & ~state.markHeld;
     if ((pressed & set) != 0 && state.marks < channel::maxMarks) {
         // On the surface, where there is one: the tool itself is pressed into it.
-        const Vec3 place = r.phase == Phase::contact ? r.proxy : r.device.position + r.deflection;
+        const Vec3 place = r.phase == Phase::contact ? r.proxy : r.tip();
         state.mark[state.marks++] = {floats(place), floats(r.device.axis)};
     }
     if ((pressed & back) != 0 && state.marks > 0) {
@@ -58,7 +58,7 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
 {
     state.tick = r.tick;
     state.time = static_cast<double>(r.tick) * tickSeconds;
-    state.tip = triple(r.device.position + r.deflection);
+    state.tip = triple(r.tip());
     state.axis = triple(r.device.axis);
     state.bend = triple(r.deflection);
     state.proxy = triple(r.proxy);

@@ -54,7 +54,7 @@ void ProbeHand::observe(const TickRecord& record) noexcept
 {
     sees_ = record.tipInBeam;
     const Vec3 across = glm::cross(record.probeAxis, record.probeLateral);
-    const Vec3 tip = record.device.position + record.deflection - record.probeFace;
+    const Vec3 tip = record.tip() - record.probeFace;
     const Vec3 up = tip - shaft * record.device.axis;
     tipAcross_ = glm::dot(tip, across);
     tipAlong_ = glm::dot(tip, record.probeLateral);

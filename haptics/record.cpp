@@ -275,6 +275,11 @@ struct Record::Impl {
 
 Record::Record(const std::filesystem::path& file) : impl_(std::make_unique<Impl>(file)) {}
 
+const std::string& Record::file() const noexcept
+{
+    return impl_->file;
+}
+
 Record::Record(Record&&) noexcept = default;
 
 Record::~Record() = default;

@@ -88,6 +88,7 @@ public:
     Record(Record&&) noexcept;
     ~Record();
 
+    const std::string& file() const noexcept;  // where it is, for messages
     const SessionInfo& info() const noexcept;
     bool complete() const noexcept;  // false when the writer was killed
     int format() const noexcept;     // version of the file's tables: 2 to 5

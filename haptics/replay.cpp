@@ -50,8 +50,7 @@ ReplayResult replay(const Record& record, const SessionModel& model)
     TickComparison comparison(record);
     record.each([&](const TickRecord& then) {
         base::failIf(then.tick != result.ticks,
-                     "tick {} is missing in the record: forces depend on every tick, so it "
-                     "cannot be replayed",
+                     "{}: tick {} is missing: forces depend on every tick, so it cannot be replayed", record.file(),
                      result.ticks);
         const TickRecord& now = simulation.tick(then.device);
         hash.add(now);
@@ -61,7 +60,7 @@ ReplayResult replay(const Record& record, const SessionModel& model)
             result.firstDifference = result.firstDifference.value_or(then.tick);
         }
     });
-    base::failIf(result.ticks == 0, "the record holds no ticks: there is nothing to replay");
+    base::failIf(result.ticks == 0, "{}: holds no ticks: there is nothing to replay", record.file());
     result.forceHash = hash.value();
     result.differences = comparison.differences();
     result.inWords = comparison.inWords();

@@ -296,7 +296,7 @@ void Scorer::addDepth(const TickRecord& record) noexcept
         return;
     }
     addBeyond(record);
-    insidePath_.add(record.device.position + record.deflection);
+    insidePath_.add(record.tip());
     score_.deepest = std::max(score_.deepest, depth);
     if (!withdrawing_) {
         depthPeak_ = std::max(depthPeak_, depth);

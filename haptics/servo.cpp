@@ -48,20 +48,22 @@ class Overload {
 public:
     explicit Overload(std::uint64_t allowed) : allowed_(allowed) {}
 
-    bool askStepDown(const ServoTiming& timing) noexcept
+    void add(bool late) noexcept
     {
-        const bool late = allowed_ > 0 && timing.missed - missedBefore_ > allowed_;
-        if (late || timing.ticks - since_ >= 1000) {
-            missedBefore_ = timing.missed;
-            since_ = timing.ticks;
+        ++ticks_;
+        late_ += late ? 1 : 0;
+    }
+    bool askStepDown() noexcept
+    {
+        const bool tooMany = allowed_ > 0 && late_ > allowed_;
+        if (tooMany || ticks_ >= 1000) {
+            late_ = ticks_ = 0;
         }
-        return late;
+        return tooMany;
     }
 
 private:
-    std::uint64_t allowed_;
-    std::uint64_t missedBefore_ = 0;
-    std::uint64_t since_ = 0;
+    std::uint64_t allowed_, late_ = 0, ticks_ = 0;
 };
 
 // Counts one period after the other.
@@ -159,7 +161,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
 {
     ServoTiming timing;
     Punctuality periods(timing);
-    Overload overload(options.missedAllowed);
+    Overload overload(options.lateAllowed);
     Pause pause(options.pause, options.paced);
     auto due = Clock::now() + period;
     int stale = 0;  // ticks that the force still fades, after a gap
@@ -172,7 +174,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
         }
         const auto start = Clock::now();
         const TickRecord record =
-            oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(timing), pause.begins());
+            oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(), pause.begins());
         stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
         addWork(timing, record, sent - start);
@@ -181,6 +183,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             due += period;
             timing.overruns += sent - start > period ? 1 : 0;
             periods.add(sent > due);
+            overload.add(sent > due);
         }
         sink(record, timing);
         if (pause.reached(record)) {

@@ -27,8 +27,9 @@ struct PauseHooks {
 struct ServoOptions {
     bool paced = true;   // one tick per millisecond; false: as fast as it goes, for batches
     double seconds = 0;  // end after this much session time; 0 = when the device has finished
-    /// Paced: asks for a cheaper model when more than this many of the last thousand ticks were missed; 0 = never.
-    std::uint64_t missedAllowed = 100;
+    /// Paced: asks for a cheaper model when more than this many of the last thousand ticks were late; 0 = never. A gap, in
+    /// which the computer did something else, is one late tick, however long it was.
+    std::uint64_t lateAllowed = 100;
     PauseHooks pause = {};  // paced: must allocate nothing, lock nothing and not block
 };
 

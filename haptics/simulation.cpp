@@ -126,7 +126,9 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
         const double touched = touchedByAll(model, probe_.tools());
         const int window = model.scene.model.elastic.window;
         elastic_[0] = elasticLevel(model, deformation_.shape(), window, stabiliserOptions_, touched);
-        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, stabiliserOptions_, touched);
+        if (window > smallWindow) {
+            elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, stabiliserOptions_, touched);
+        }
     }
 }
 
@@ -211,10 +213,10 @@ void Simulation::stepDownIfAsked() noexcept
     }
     if (level_ == datasets::ModelLevel::chainmail) {
         level_ = datasets::ModelLevel::spring;
-    } else if (stepsDown_ + 1 == static_cast<int>(elastic_.size())) {
-        level_ = datasets::ModelLevel::chainmail;
-    } else {
+    } else if (stepsDown_ == 0 && elastic_[1]) {
         elastic_[1]->takeOver(*elastic_[0]);
+    } else {
+        level_ = datasets::ModelLevel::chainmail;
     }
     ++stepsDown_;
     addEvent(record_, {EventKind::stepDown, 0xFF, 0, static_cast<double>(stepsDown_)});

@@ -68,7 +68,8 @@ private:
     chainmail::Deformation deformation_;
     chainmail::SpringLevel spring_;
     chainmail::ChainMailLevel chainmail_;
-    // Where the scene's level is `elastic`: its own, and one on small windows, the step below it.
+    // Where the scene's level is `elastic`: its own, and the step below it, on small windows; none where its own are as
+    // small.
     std::array<std::unique_ptr<chainmail::ElasticLevel>, 2> elastic_;
     datasets::ModelLevel level_;
     int stepsDown_ = 0;

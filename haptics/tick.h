@@ -162,6 +162,9 @@ struct TickRecord {
     std::array<Event, maxEventsPerTick> events{};  // in their order; the first eventCount count
     std::uint32_t eventCount = 0;                  // of this tick
     std::array<float, taskCount> seconds{};        // by task, wall time [s]
+
+    /// Where the tool's tip is, as its bend has moved it (sphere: its centre) [m].
+    Vec3 tip() const noexcept { return device.position + deflection; }
 };
 
 }  // namespace palpate::haptics

@@ -5,6 +5,7 @@
 
 #include <base/error.h>
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -47,6 +48,7 @@ base::Descriptor secretCookie()
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != parent)
         ::_exit(1);
+    ::setpgid(0, 0);  // Ctrl-C is for who draws on it
     const int nothing = ::open("/dev/null", O_RDWR);
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         ::dup2(nothing, stream);
@@ -72,6 +74,14 @@ std::string readNumber(int from)
 }
 
 }  // namespace
+
+std::string noDisplay()
+{
+    const char* const display = std::getenv("DISPLAY");
+    return display == nullptr || *display == '\0'
+               ? "no display: set DISPLAY"
+               : fmt::format("DISPLAY {} does not answer: set it to one that does", display);
+}
 
 bool displayWorks()
 {

@@ -8,6 +8,9 @@
 
 namespace palpate::render {
 
+/// Why there is none, and what to do: the environment names no display, or one that does not answer.
+std::string noDisplay();
+
 /// True when the display that the environment names can be opened. It stays open: a server that ends or begins anew with
 /// its last client would be gone before the window comes.
 bool displayWorks();

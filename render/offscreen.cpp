@@ -11,6 +11,7 @@
 #include <vtkPNGWriter.h>
 #include <vtkRenderWindow.h>
 #include <vtkSmartPointer.h>
+#include <vtkUnsignedCharArray.h>
 
 #include <fmt/format.h>
 
@@ -55,21 +56,16 @@ private:
     {
         if (!std::exchange(made_, true))
             base::makeFolders(folder_);
-        const std::filesystem::path file = folder_ / name, partial = folder_ / (name + ".part");
         const auto grab = grabbed(window_);
         vtkNew<vtkPNGWriter> writer;
         writer->SetInputConnection(grab->GetOutputPort());
         writer->SetCompressionLevel(2);
         writer->AddText(base::pngTimeKeyword, fmt::format("{:.3f}", time).c_str());
-        writer->SetFileName(partial.c_str());
+        writer->WriteToMemoryOn();
         writer->Write();
-        std::error_code error;
-        if (writer->GetErrorCode() == 0)
-            std::filesystem::rename(partial, file, error);
-        if (writer->GetErrorCode() != 0 || error) {
-            std::filesystem::remove(partial, error);
-            throw base::error("{}: cannot be written (is the disk full?)", file.native());
-        }
+        vtkUnsignedCharArray* const png = writer->GetResult();
+        base::writeWhole(folder_ / name, {reinterpret_cast<const char*>(png->GetPointer(0)),
+                                          static_cast<std::size_t>(png->GetNumberOfValues())});
     }
 
     std::filesystem::path folder_;

@@ -72,12 +72,14 @@ ViewerFigures runViewer(const ViewerOptions& options)
 {
     check(options);
     interruptedBy = 0;
-    std::signal(SIGINT, onInterrupt);
-    std::signal(SIGTERM, onInterrupt);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
+        if (std::signal(signal, onInterrupt) == SIG_IGN)
+            std::signal(signal, SIG_IGN);
+    }
     standBack();
     const bool window = options.offscreen.empty() && options.movie.empty();
     const bool works = !options.hidden && displayWorks();
-    base::failIf(window && !options.hidden && !works, "no display: set DISPLAY, or use --offscreen DIR");
+    base::failIf(window && !options.hidden && !works, "{}, or use --offscreen DIR", noDisplay());
     std::optional<PrivateDisplay> display;
     if (!works)
         display.emplace();

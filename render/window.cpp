@@ -6,6 +6,7 @@
 
 #include <base/error.h>
 #include <render/controls.h>
+#include <render/display.h>
 #include <render/follower.h>
 #include <render/hosts.h>
 #include <render/sounds.h>
@@ -36,7 +37,7 @@ using Window = std::unique_ptr<GLFWwindow, decltype([](GLFWwindow* window) {
 
 Window openWindow(const ViewerOptions& options)
 {
-    base::failIf(glfwInit() == GLFW_FALSE, "no display: set DISPLAY, or use --offscreen DIR");
+    base::failIf(glfwInit() == GLFW_FALSE, "{}, or use --offscreen DIR", noDisplay());
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);

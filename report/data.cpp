@@ -151,7 +151,7 @@ struct Collector {
 
     void addPath(const haptics::TickRecord& r)
     {
-        const PathPoint point{(r.device.position + r.deflection) * 1e3, r.phase == haptics::Phase::inserted};
+        const PathPoint point{r.tip() * 1e3, r.phase == haptics::Phase::inserted};
         if (data.path.empty() || data.path.back().inside != point.inside ||
             glm::distance(data.path.back().tip, point.tip) > pathStep) {
             data.path.push_back(point);

@@ -39,6 +39,10 @@ def scene(volume, radius, entry, aim, model='setting = "SETTING"'):
 
 
 def session(text, setting):
+    """A session in a scene at a setting, or at MMxNODES: spacing_mm and window of [model.elastic]."""
+    if "x" in setting:
+        spacing, window = setting.split("x")
+        text = text.replace('setting = "SETTING"', f"elastic = {{spacing_mm = {spacing}, window = {window}}}")
     return palpate.Session(palpate.Scene.parse(text.replace("SETTING", setting)))
 
 

@@ -102,7 +102,11 @@ constexpr std::array kinds{
     DeviceKind{"falcon", "falcon (Novint Falcon)", "falcon", true, false, openFalcon},
     DeviceKind{"", "a record (.db) to play back", "", false, false,
                [](const SessionModel&, const DeviceRequest& request, const Broadcast*) -> std::unique_ptr<Device> {
-                   return std::make_unique<haptics::ReplayDevice>(haptics::Record(request.name));
+                   const haptics::Record record(request.name);
+                   base::failIf(record.info().rate != 1.0 / haptics::tickSeconds,
+                                "{}: was recorded at {:g} Hz, and a session runs at {:g}: palpate replay computes it again",
+                                request.name, record.info().rate, 1.0 / haptics::tickSeconds);
+                   return std::make_unique<haptics::ReplayDevice>(record);
                }},
 };
 

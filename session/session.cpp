@@ -50,6 +50,7 @@ SessionFigures Session::figures() const
     figures.score = watch_.score();
     figures.losses = watch_.losses(info_);
     figures.forceHash = hash_.value();
+    figures.level = simulation_.level();
     return figures;
 }
 
@@ -69,6 +70,9 @@ void Session::add(const TickRecord& r) noexcept
     for (std::uint32_t i = 0; i < r.eventCount; ++i) {
         f.contacts += r.events[i].kind == EventKind::contact ? 1 : 0;
         f.punctures += r.events[i].kind == EventKind::puncture ? 1 : 0;
+        if (r.events[i].kind == EventKind::stepDown) {
+            f.steppedDownAt = f.stepsDown++ == 0 ? static_cast<double>(r.tick) / info_.rate : f.steppedDownAt;
+        }
     }
     if (r.fired && f.cores.size() < maxCores) {
         f.cores.push_back(r.core);

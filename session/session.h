@@ -30,6 +30,9 @@ struct SessionFigures {
     double energyDamped = 0;                               // taken by the controller [J]
     std::uint64_t forceHash = 0;                           // of all forces, see haptics::ForceHash
     bool faulted = false;                                  // a force or a pose was not finite: the force was switched off
+    int stepsDown = 0;                                     // to a cheaper model, as ticks came late
+    double steppedDownAt = 0;                              // the first time, in session time [s]
+    datasets::ModelLevel level{};                          // in use at the end
 };
 
 /// How a session is run, and what hears of it beside.

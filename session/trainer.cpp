@@ -71,6 +71,20 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
     }
 }
 
+std::string_view modelOf(const SessionFigures& figures)
+{
+    return datasets::modelLevels[static_cast<std::size_t>(figures.level)];
+}
+
+std::string steppedDown(const SessionFigures& figures)
+{
+    return fmt::format(
+        "too many ticks came late: from {:.1f} s on the tissue was computed by a cheaper model ({} at the end), and feels "
+        "different",
+        figures.steppedDownAt,
+        figures.level == datasets::ModelLevel::elastic ? "elastic with smaller windows" : modelOf(figures));
+}
+
 }  // namespace
 
 struct Trainer::Impl {
@@ -144,6 +158,8 @@ struct Trainer::Impl {
                               {"pauses", fmt::format("{}", result.timing.pauses)},
                               {"paused_s", fmt::format("{:.3f}", result.timing.paused)},
                               {"force_hash", fmt::format("{:016x}", result.forceHash)},
+                              {"steps_down", fmt::format("{}", result.stepsDown)},
+                              {"model_at_end", std::string(modelOf(result))},
                               {"score_total", fmt::format("{:.1f}", result.score.total)}});
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();
@@ -206,6 +222,10 @@ TrainResult Trainer::run()
     }
     TrainResult result;
     static_cast<SessionFigures&>(result) = impl_->session.figures();
+    if (result.stepsDown > 0) {
+        warnings.push_back(steppedDown(result));
+        fmt::print(stderr, "palpate: {}\n", warnings.back());
+    }
     result.timing = std::move(impl_->timing);
     result.warnings = warnings;
     result.signal = EndInOrder::signal();

@@ -183,10 +183,16 @@ DeviceCheck readDevices(const fs::path& figures)
         return check;
     }
     const auto& f = falcons.front();
+    const bool known = f.contains("firmware_runs") && f.at("firmware_runs").is_boolean();
     if (!f.value("allowed", false)) {
         check.falcon = tr("A Novint Falcon is there, but may not be opened");
         check.remedy = tr("Run 'sudo palpate devices --install-udev' once, and plug it in again.");
-    } else if (!f.value("firmware_runs", false)) {
+    } else if (!known) {
+        const std::string why = f.value("problem", "");
+        check.falcon = why.empty() ? tr("A Novint Falcon is there") : tr("A Novint Falcon is there, but cannot be asked");
+        check.remedy = why.empty() ? tr("Name the firmware file of its maker below: the session loads it.") : why;
+        check.falconReady = true;  // the session tries again, and says what is wrong
+    } else if (!f.at("firmware_runs").get<bool>()) {
         check.falcon = tr("A Novint Falcon is there; its firmware is not loaded");
         check.remedy = tr("Name the firmware file of its maker below: the session loads it.");
         check.falconReady = true;

@@ -1,6 +1,7 @@
 #include <trainer/stage.h>
 
 #include <base/error.h>
+#include <base/said.h>
 #include <base/words.h>
 #include <trainer/case_pictures.h>
 #include <trainer/look.h>
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <map>
 #include <utility>
 #include <vector>
@@ -32,7 +34,13 @@ using Window = std::unique_ptr<GLFWwindow, decltype([](GLFWwindow* window) {
 
 Window openWindow(int width, int height)
 {
-    base::failIf(glfwInit() == GLFW_FALSE, "{}", tr("no display: set DISPLAY, or type palpate --help for the commands"));
+    const char* const display = std::getenv("DISPLAY");
+    base::failIf(
+        glfwInit() == GLFW_FALSE, "{}",
+        display != nullptr && *display != '\0'
+            ? base::said(tr("DISPLAY {} does not answer: set another one, or type palpate --help for the commands"),
+                         display)
+            : tr("no display: set DISPLAY, or type palpate --help for the commands"));
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);

@@ -1,5 +1,6 @@
 #include <trainer/window.h>
 
+#include <base/end_in_order.h>
 #include <base/quantiles.h>
 #include <base/user_files.h>
 #include <base/words.h>
@@ -89,7 +90,7 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     Presses presses(stage, errands);
     std::vector<double> seconds;
     int due = 0;  // pictures until all has settled
-    while (options.frames == 0 || seconds.size() < options.frames) {
+    while (!base::EndInOrder::asked() && (options.frames == 0 || seconds.size() < options.frames)) {
         if (stage.closed() && leave(state) == Errand::quit) {
             break;
         }

@@ -43,7 +43,7 @@ bool waitForHold(Link& link, const Transport& wire, const std::atomic<bool>& sto
 
 }  // namespace
 
-ForceTest testForce(Link& link, const Transport& wire, const Say& say, const std::atomic<bool>& stop)
+ForceTest testForce(Link& link, const Transport& wire, const Say& say, const std::atomic<bool>& stop, Guardian& guardian)
 {
     ForceTest test;
     say("hold the grip loosely and press its centre button: it pushes towards you with 1 N, about the weight of an apple");
@@ -57,11 +57,13 @@ ForceTest testForce(Link& link, const Transport& wire, const Say& say, const std
     while (t < rise + stay + fall && held(link) && !stop && !link.lost() && !link.frozen()) {
         t = wire.now() - begun;
         link.exchange({{0.0, 0.0, testNewton * shape(t)}, wire.now(), 1});
+        guardian.beat(link.command().motor != Triple{});
         test.peak = std::max(test.peak, motorPush(link));
         test.moved = std::max(test.moved, link.pose().position.z - from);
     }
     test.complete = t >= rise + stay + fall;
     link.rest();
+    guardian.beat(false);
     return test;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <haptics/falcon/guardian.h>
 #include <haptics/falcon/link.h>
 
 #include <atomic>
@@ -23,7 +24,8 @@ inline constexpr double testNewton = 1.0;  // towards the user, for a second [N]
 /// @param wire  the link's, for its clock
 /// @param say   tells the user what to do
 /// @param stop  ends it before its time
-ForceTest testForce(Link& link, const Transport& wire, const Say& say, const std::atomic<bool>& stop);
+/// @param guardian  hears of every packet, whether it put torque on
+ForceTest testForce(Link& link, const Transport& wire, const Say& say, const std::atomic<bool>& stop, Guardian& guardian);
 
 /// What it means, in words for the user, and what to do.
 std::string inWords(const ForceTest& test);

@@ -238,7 +238,7 @@ Transfer measureTransfer(const SessionModel& model, const TransferOptions& optio
         receiver.waitUntilReady();
         pipe.open();
         transfer.sent = runPaced(session, options.seconds, [&](const TickRecord& r, const ServoTiming&) {
-            const Vec3 tip = r.device.position + r.deflection;
+            const Vec3 tip = r.tip();
             pipe.write({r.tick, now(), {tip.x, tip.y, tip.z}});
         });
         pipe.close();

@@ -71,6 +71,11 @@ TEST_F(PressCommand, APathThatBeginsInsideTheBodyIsSaidTo)
     EXPECT_EQ(inside.status, 0) << inside.err;
     EXPECT_NE(inside.err.find("the path begins with the tool's middle 5.0 mm inside the body"), std::string::npos)
         << inside.err;
+    writeText(path, "x_mm,y_mm,z_mm\n0,-2,0\n0,-2,0\n");
+    const Outcome touching = palpate({"press", scene, "--path", path});
+    EXPECT_NE(touching.err.find("the path begins with the tool 3.0 mm in the body"), std::string::npos) << touching.err;
+    writeText(path, "x_mm,y_mm,z_mm\n0,-5,0\n0,-4,0\n");
+    EXPECT_EQ(palpate({"press", scene, "--path", path}).err, "");
 }
 
 TEST_F(PressCommand, AToolThatIsHeldBackIsSaidToBe)

@@ -16,6 +16,7 @@
 #include <fstream>
 #include <functional>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -229,15 +230,38 @@ TEST(Session, OfAnyNameThatAKilledProcessHasLeftIsRemovedByTheNextPublisher)
 TEST(Session, OfARecycledPidIsTakenOver)
 {
     const std::string session = sessionNamed("recycled");
-    Publisher old(session, smallScenery(), smallLabels());
-    RawSegment(segmentName(session)).at<Header>(0).ownerStart += 1;
+    leaveSegmentOfDead(session);
+    {
+        RawSegment left(segmentName(session));
+        left.at<Header>(0).ownerPid = static_cast<std::uint64_t>(::getpid());
+        left.at<Header>(0).ownerStart = processStart(static_cast<std::uint64_t>(::getpid())) + 1;
+    }
     EXPECT_FALSE(listed(session));
     const Publisher next(session, smallScenery(), smallLabels());
     EXPECT_TRUE(listed(session));
-    {
-        const Publisher gone = std::move(old);
-    }
-    EXPECT_TRUE(listed(session)) << "the old one removes only its own segment";
+}
+
+TEST(Session, APublisherRemovesOnlyItsOwnSegment)
+{
+    const std::string session = sessionNamed("own");
+    std::optional<Publisher> old(std::in_place, session, smallScenery(), smallLabels());
+    removeSegment(session);
+    const Publisher next(session, smallScenery(), smallLabels());
+    old.reset();
+    EXPECT_TRUE(listed(session));
+}
+
+// Two containers may share /dev/shm and not see each other's processes: whose process cannot be seen lives all the same.
+TEST(Session, OfAProcessThatCannotBeSeenStays)
+{
+    const std::string session = sessionNamed("unseen");
+    const Publisher publisher(session, smallScenery(), smallLabels());
+    RawSegment(segmentName(session)).at<Header>(0).ownerPid = 999999999;  // no process has this number
+    const Publisher other(sessionNamed("beside"), smallScenery(), smallLabels());
+    EXPECT_TRUE(inMemory(segmentName(session)));
+    EXPECT_NE(messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("in another container"),
+              std::string::npos);
+    EXPECT_TRUE(inMemory(segmentName(session)));
 }
 
 TEST(Session, GoesToExactlyOneOfSeveralNewcomers)

@@ -19,8 +19,9 @@ struct Tested {
     ForceTest run()
     {
         return testForce(
-            rig.link, rig.wire, [this](const std::string& what) { said = what; }, rig.stop);
+            rig.link, rig.wire, [this](const std::string& what) { said = what; }, rig.stop, guardian);
     }
+    Guardian guardian;
     Rig rig;
     std::string said;
 };

@@ -164,7 +164,7 @@ TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
     int stood = 0, stoodElsewhere = 0;
     double pushed = 0, afterwards = 0;  // largest force before the pause and at the end [N]
     ServoOptions options{true, 2.0};
-    options.missedAllowed = 0;
+    options.lateAllowed = 0;
     options.pause.asked = [&] { return asked; };
     options.pause.standing = [&](bool elsewhere) {
         EXPECT_EQ(glm::length(device.last), 0.0);

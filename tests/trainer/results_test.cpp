@@ -173,6 +173,10 @@ TEST(Devices, AreToldWithWhatToDo)
     EXPECT_FALSE(closed.falconReady);
     EXPECT_NE(closed.remedy.find("--install-udev"), std::string::npos);
     EXPECT_TRUE(check(R"({"falcons": [{"allowed": true, "firmware_runs": false}]})").falconReady);
+    const DeviceCheck busy = check(
+        R"({"falcons": [{"allowed": true, "firmware_runs": null, "homed": null, "problem": "another program uses it"}]})");
+    EXPECT_TRUE(busy.falconReady);
+    EXPECT_EQ(busy.remedy, "another program uses it");
     const DeviceCheck ready = check(R"({"falcons": [{"allowed": true, "firmware_runs": true, "homed": true}]})");
     EXPECT_TRUE(ready.falconReady);
     EXPECT_EQ(ready.remedy, "");

@@ -106,6 +106,27 @@ TEST(Grip, TheCommandPrintsALineForEachPressAndLetsTheFalconGo)
     EXPECT_EQ(lines.substr(lines.find('\n') + 1), "button forward\nbutton left\n");
 }
 
+// By hand (Ctrl-C), or by the trainer's window as it is closed: the push ends and its torque is gone.
+TEST(Grip, ATestPushThatIsInterruptedLeavesNoTorque)
+{
+    for (const int signal : {SIGINT, SIGTERM}) {
+        GripBench bench;
+        Program command("palpate", {"devices", "--force-test"});
+        const Vec3 middle = bench.device.hand.goal;
+        double side = 5e-3;
+        ASSERT_TRUE(waitFor([&] {
+            side = -side;
+            bench.device.hand.goal = middle + Vec3(side, side, 2 * side);
+            bench.device.hand.buttons = buttonCentre;
+            return largestOf(bench.device.command().motor) > 100;
+        }));
+        command.send(signal);
+        EXPECT_EQ(command.wait().status, 128 + signal);
+        EXPECT_EQ(bench.device.command().motor, Triple{});
+        EXPECT_FALSE(bench.kernel.claimed);
+    }
+}
+
 TEST(Grip, ACommandThatNobodyListensToEnds)
 {
     const GripBench bench;
