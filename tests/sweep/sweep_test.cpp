@@ -345,6 +345,24 @@ TEST(CaseRunner, ForceContrastFallsWithDepthAndRisesWithSizeAndStiffness)
     EXPECT_NEAR(contrast(3.25, 10, 6), 0.0, 0.05);
 }
 
+// F = K d: 1 N/mm, 10 mm deep. The hand gets at most the device's 8.5 N, and after a fast press less for some ticks.
+TEST(CaseRunner, TheForceOfAPressIsThatOfTheTissueAndNotWhatTheHandGets)
+{
+    const SweepPlan plan = parsePlan(
+        "scene = \"block\"\noutputs = [\"force_n\", \"stiffness_n_m\", \"peak_force_n\"]\n"
+        "[[axis]]\nkey = \"procedure.hold_ms\"\nvalues = [1, 60]\n"
+        "[procedure]\nkind = \"press\"\ndepth_mm = 10\nspeed_mm_s = 2000\n"
+        "[set]\nvolume.voxel_mm = 4\nmodel.level = \"spring\"\nmodel.stiffness_n_m = 1000\n",
+        "plan.toml", namedScene);
+    CaseRunner runner(plan, "test");
+    for (const std::size_t hold : {0U, 1U}) {
+        const CaseRow row = runner.run(hold);
+        EXPECT_NEAR(row.outputs[0], 10, 0.01) << hold;
+        EXPECT_NEAR(row.outputs[1], 1000, 1) << hold;
+        EXPECT_LT(row.outputs[2], 9) << hold;
+    }
+}
+
 // A late force is felt late: the same hand, another session.
 TEST(CaseRunner, DelayChangesASession)
 {
