@@ -228,6 +228,23 @@ TEST(SweepPlan, TriesTissuesOfVolumesAndReferences)
     }
 }
 
+// Each whole number has an equal part of the samples: of 60 strata 20. Rounding gave the ends half of the others' share.
+// A grid has both ends and rounds between them, as before.
+TEST(SweepPlan, WholeNumbersAreSampledAlike)
+{
+    const std::string axis = "[[axis]]\nname = \"k\"\nwhole = true\nrange = [-1, 1]\n";
+    const auto counts = [](const SweepPlan& plan) {
+        std::map<double, int> out;
+        for (std::size_t i = 0; i < plan.cases(); ++i) {
+            ++out[sweepPoint(plan, i).variables.at("k")];
+        }
+        return out;
+    };
+    EXPECT_EQ(counts(planOf("[design]\nkind = \"latin_hypercube\"\nsamples = 60\n" + axis)),
+              (std::map<double, int>{{-1, 20}, {0, 20}, {1, 20}}));
+    EXPECT_EQ(counts(planOf(axis + "steps = 5\n")), (std::map<double, int>{{-1, 2}, {0, 1}, {1, 2}}));
+}
+
 TEST(SweepPlan, ReadyPlansAreWhole)
 {
     for (const std::string& name : builtInPlans()) {
