@@ -110,6 +110,17 @@ TEST(Formula, IsMissingWhereANumberInItIs)
     EXPECT_THROW(evaluate("a = 5", {{"a", 1}}), std::runtime_error);
 }
 
+// muParser takes the last of several values: 0,5 was 5.
+TEST(Formula, RefusesADecimalComma)
+{
+    for (const char* formula : {"0,5", "a * 0,5", "1 + (a, 2)"}) {
+        const std::string error = tests::errorOf([&] { evaluate(formula, {{"a", 2}}); });
+        EXPECT_TRUE(error.starts_with("formula '" + std::string(formula) + "': ")) << formula << ": " << error;
+    }
+    EXPECT_EQ(tests::errorOf([] { evaluate("0,5", {}); }), "formula '0,5': has several values: write a decimal point");
+    EXPECT_EQ(evaluate("max(1, 5) * 0.5", {}), 2.5);
+}
+
 TEST(SweepPlan, FormulasRangesAndConstraints)
 {
     const SweepPlan plan = planOf(
@@ -181,6 +192,18 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + axis("dffb.gain", "[1]") + "[procedure]\ntrainee = \"novice\"\nkind = \"press\"\n",
          "a procedure of kind press has the keys depth_mm"},
         {scene + axis("procedure.depth_mm", "[1]"), "a procedure of kind session has the keys trainee"},
+        {scene + axis("dffb.gain", "[1]") + "[procedure]\nseconds = \"= 0,5\"\n", "write a decimal point"},
+        {scene + "[[axis]]\nname = \"x\"\nvalues = [1, \"two\", 3]\n", "only numbers or only words"},
+        {scene + "[[axis]]\nname = \"x\"\nvalues = [true, 2.5]\n", "only numbers or only words"},
+        {scene + "[[axis]]\nname = \"w\"\nvalues = [\"a-b\", \"a b\"]\n",
+         "the word 'a-b' of axis 'w' and the word 'a b' of axis 'w' alike, 'w_a_b'"},
+        {scene + "[[axis]]\nname = \"a\"\nvalues = [\"b\"]\n[[axis]]\nname = \"a_b\"\nvalues = [5]\n",
+         "axis 'a_b' and the word 'b' of axis 'a' alike"},
+        {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n\"\nvalues = [1]\n",
+         "an output of the procedure and axis 'force_n' alike"},
+        {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n_change_pct\"\n"
+                 "values = [1]\n[reference]\ndffb.gain = 0\n",
+         "an output of the procedure and axis 'force_n_change_pct' alike"},
     };
     for (const auto& [text, hint] : wrong) {
         const std::string error = refusal(text);
@@ -188,6 +211,14 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         EXPECT_TRUE(error.starts_with("plan.toml")) << error;
         EXPECT_EQ(error.find('\n'), std::string::npos) << error;
     }
+}
+
+// What formulas cannot mix up is let through: a word that comes twice, and what only another procedure measures.
+TEST(SweepPlan, NamesThatDifferAreNotRefused)
+{
+    EXPECT_EQ(refusal("scene = \"block\"\n[design]\nkind = \"list\"\n[[axis]]\nname = \"w\"\nvalues = [\"a\", \"b\", "
+                      "\"a\"]\n[[axis]]\nname = \"force_n\"\nvalues = [1, 2.5, 3]\n"),
+              "");
 }
 
 // 61 x 61 cases, of which 60 are tried evenly, every 63rd: none of them has the one wrong value.
