@@ -2,13 +2,13 @@
 #include <apps/listed.h>
 #include <base/error.h>
 #include <base/mapped.h>
-#include <base/quantiles.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <base/utc.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <command/progress.h>
+#include <report/groups.h>
 #include <training/course_check.h>
 #include <training/folders.h>
 #include <training/progress.h>
@@ -23,6 +23,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <set>
 
 namespace palpate::apps {
 
@@ -91,6 +93,24 @@ void checkCurriculum(const CurriculumArguments& o)
     fmt::print("good\n");
 }
 
+// That of the last session whose curriculum is there; nothing: none of them.
+std::optional<Curriculum> lastPractised(const std::vector<training::StoredSession>& sessions)
+{
+    std::set<std::string> missing;
+    for (auto s = sessions.rbegin(); s != sessions.rend(); ++s) {
+        if (s->curriculum.empty() || missing.contains(s->curriculum)) {
+            continue;
+        }
+        try {
+            return training::findCurriculum(s->curriculum);
+        } catch (const std::runtime_error& e) {
+            fmt::print(stderr, "palpate: warning: sessions of a missing curriculum are not counted: {}\n", e.what());
+            missing.insert(s->curriculum);
+        }
+    }
+    return std::nullopt;
+}
+
 void next(const CurriculumArguments& o)
 {
     const auto store = training::ProfileStore::toRead(o.profiles);
@@ -98,9 +118,10 @@ void next(const CurriculumArguments& o)
     const auto sessions = store.sessions(person);
     // The one that was named, else that of the last session, else all.
     std::vector<Curriculum> curricula;
-    const auto last = std::find_if(sessions.rbegin(), sessions.rend(), [](const auto& s) { return !s.curriculum.empty(); });
-    if (!o.id.empty() || last != sessions.rend()) {
-        curricula.push_back(training::findCurriculum(o.id.empty() ? last->curriculum : o.id));
+    if (!o.id.empty()) {
+        curricula.push_back(training::findCurriculum(o.id));
+    } else if (const auto last = lastPractised(sessions)) {
+        curricula.push_back(*last);
     } else {
         curricula = listed("curricula", training::allCurricula);
     }
@@ -156,10 +177,10 @@ void simulate(const CurriculumArguments& o)
         nlohmann::json one = {{"skill", law.name}, {"people", o.people}, {"finished", taken.size()}};
         std::string words = "none";
         if (!taken.empty()) {
-            const auto at = [&](double fraction) { return base::lowerQuantile(taken, fraction); };
+            const auto at = [&](double fraction) { return report::quantile(taken, fraction); };
             one["sessions"] = {
                 {"median", at(0.5)}, {"lower_quartile", at(0.25)}, {"upper_quartile", at(0.75)}, {"max", at(1)}};
-            words = fmt::format("{:.0f} ({:.0f} to {:.0f}; {:.0f})", at(0.5), at(0.25), at(0.75), at(1));
+            words = fmt::format("{:g} ({:g} to {:g}; {:g})", at(0.5), at(0.25), at(0.75), at(1));
         }
         figures.push_back(one);
         if (o.json != "-") {

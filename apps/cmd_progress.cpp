@@ -108,6 +108,9 @@ void addToGroup(const ProgressArguments& o, const std::string& text, const train
     const bool tables = !o.csv.empty() || !o.xapi.empty();  // which say whether levels were met
     for (const std::string& name : namesIn(text.substr(equals + 1), store)) {
         const training::Person person = store.find(name);
+        const auto isPerson = [&](const PersonProgress& other) { return other.person.id == person.id; };
+        base::failIf(std::ranges::any_of(group->people, isPerson),
+                     "--group {}: {} is in this group already: name each profile once", text, person.name);
         PersonProgress p =
             tables ? progressOf(store, person, {}, curricula) : PersonProgress{person, store.sessions(person), {}};
         std::erase_if(p.sessions, [&](const training::StoredSession& s) {
@@ -238,8 +241,8 @@ void addProgress(CLI::App& app)
         ->allow_extra_args(false);
     c->add_option("--curriculum", o->curricula, "Show this curriculum also if it was not begun; may be repeated")
         ->allow_extra_args(false);
-    c->add_option("--case", o->caseId, "With --group: only sessions of this case");
-    c->add_option("--exercise", o->exercise, "With --group: only sessions of this CURRICULUM/EXERCISE");
+    c->add_option("--case", o->caseId, "With --group: only sessions of this case")->needs("--group");
+    c->add_option("--exercise", o->exercise, "With --group: only sessions of this CURRICULUM/EXERCISE")->needs("--group");
     c->add_option("--html", o->html, "Write a page (HTML) to this file");
     c->add_option("--csv", o->csv, "Write a table (CSV) to this file, one row per session; with --group also theirs");
     c->add_option("--xapi", o->xapi, "Write xAPI statements to this file");

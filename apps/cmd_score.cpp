@@ -67,15 +67,31 @@ std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessio
     return sessions.size() - 1;
 }
 
+// The same file, or a copy of it.
+bool isSame(const Session& a, const Session& b)
+{
+    std::error_code none;
+    return std::filesystem::equivalent(a.file, b.file, none) || (!a.sha256.empty() && a.sha256 == b.sha256);
+}
+
 report::ScoredGroup parseGroup(const std::string& text, std::vector<Session>& sessions)
 {
     const std::size_t equals = text.find('=');
     base::failIf(equals == 0 || equals == std::string::npos || equals + 1 == text.size(),
                  "--group {}: give a name and files, as in --group experts=a.db,b.db", text);
     report::ScoredGroup group{text.substr(0, equals), {}};
+    std::vector<std::size_t> members;
     for (const std::string& file : CLI::detail::split(text.substr(equals + 1), ',')) {
         base::failIf(file.empty(), "--group {}: a file between two commas is missing", text);
-        group.sessions.push_back(report::rowOf(sessions[open(file, sessions)].score));
+        const std::size_t opened = open(file, sessions);
+        const auto same =
+            std::ranges::find_if(members, [&](std::size_t m) { return isSame(sessions[m], sessions[opened]); });
+        if (same != members.end()) {
+            throw base::error("--group {}: {} is the record {}, which is in this group already: name each record once",
+                              text, file, sessions[*same].file.string());
+        }
+        members.push_back(opened);
+        group.sessions.push_back(report::rowOf(sessions[opened].score));
     }
     return group;
 }

@@ -211,6 +211,19 @@ std::pair<datasets::Scene, Procedure> readCase(toml::table root)
     }
 }
 
+std::size_t indexAt(const Axis& axis, double unit)
+{
+    const std::size_t count = axis.values.size();
+    return std::min(static_cast<std::size_t>(unit * static_cast<double>(count)), count - 1);
+}
+
+KeyValue inRange(const Axis& axis, double unit)
+{
+    const double value =
+        axis.log ? axis.low * std::pow(axis.high / axis.low, unit) : axis.low + unit * (axis.high - axis.low);
+    return axis.whole ? KeyValue(static_cast<std::int64_t>(std::llround(value))) : value;
+}
+
 }  // namespace
 
 std::string withoutPlace(const std::string& error)
@@ -253,11 +266,14 @@ std::optional<double> numberOf(const KeyValue& value)
 KeyValue Axis::at(double unit) const
 {
     if (!values.empty()) {
-        const auto index = static_cast<std::size_t>(unit * static_cast<double>(values.size()));
-        return values[std::min(index, values.size() - 1)];
+        return values[indexAt(*this, unit)];
     }
-    const double value = log ? low * std::pow(high / low, unit) : low + unit * (high - low);
-    return whole ? KeyValue(static_cast<std::int64_t>(std::llround(value))) : value;
+    if (whole && !log) {
+        // Rounding would give the ends half the share of the others.
+        const double first = std::round(low), last = std::round(high);
+        return static_cast<std::int64_t>(std::min(last, first + std::floor(unit * (last - first + 1))));
+    }
+    return inRange(*this, unit);
 }
 
 KeyValue Axis::level(std::size_t index) const
@@ -265,7 +281,27 @@ KeyValue Axis::level(std::size_t index) const
     if (!values.empty()) {
         return values[index];
     }
-    return index + 1 == steps ? at(1.0) : at(static_cast<double>(index) / static_cast<double>(steps - 1));
+    return index + 1 == steps ? inRange(*this, 1.0)
+                              : inRange(*this, static_cast<double>(index) / static_cast<double>(steps - 1));
+}
+
+double Axis::placeAt(double unit) const
+{
+    if (!values.empty()) {
+        const auto last = static_cast<double>(values.size() - 1);
+        return last > 0 ? static_cast<double>(indexAt(*this, unit)) / last : 0.0;
+    }
+    if (!whole) {
+        return unit;
+    }
+    const double value = *numberOf(at(unit));
+    const double place = log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);
+    return std::clamp(place, 0.0, 1.0);
+}
+
+std::string Axis::variableOf(const KeyValue& word) const
+{
+    return name + "_" + columnOf(toText(word));
 }
 
 SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)
@@ -287,7 +323,7 @@ SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)
             c.variables[axis.name] = *number;
         } else {
             for (const KeyValue& value : axis.values) {
-                c.variables[axis.name + "_" + columnOf(toText(value))] = value == c.parameters.back() ? 1 : 0;
+                c.variables[axis.variableOf(value)] = value == c.parameters.back() ? 1 : 0;
             }
         }
     }

@@ -1,5 +1,7 @@
 #include <sweep/formula.h>
 
+#include <base/error.h>
+
 #include <muParser.h>
 
 #include <algorithm>
@@ -21,6 +23,8 @@ double evaluate(const std::string& formula, const std::map<std::string, double>&
         parser.SetExpr(formula);
         names.SetExpr(formula);
         const double value = parser.Eval();
+        // Several values between commas give the last one: 0,5 would be 5.
+        base::failIf(parser.GetNumResults() > 1, "formula '{}': has several values: write a decimal point", formula);
         // A comparison with what is missing would be 0, a number like any other.
         const auto isMissing = [](const auto& used) { return std::isnan(*used.second); };
         return std::ranges::any_of(names.GetUsedVar(), isMissing) ? std::numeric_limits<double>::quiet_NaN() : value;

@@ -62,6 +62,18 @@ void readRange(Section& section, std::string_view key, Axis& axis)
     section.refuseIf(axis.log && axis.low <= 0, key, "a logarithmic range must be above 0");
 }
 
+void readValues(Section& section, Axis& axis)
+{
+    const toml::array* const list = section.node("values")->as_array();
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+        axis.values.push_back(valueOf(section, "values", *list->get(i)));
+    }
+    section.refuseIf(axis.values.empty(), "values", "expected a list of values");
+    const auto isNumber = [](const KeyValue& value) { return numberOf(value).has_value(); };
+    section.refuseIf(std::ranges::any_of(axis.values, isNumber) && !std::ranges::all_of(axis.values, isNumber), "values",
+                     "numbers and words in one list: give an axis only numbers or only words");
+}
+
 Axis readAxis(Section& section, DesignKind design)
 {
     Axis axis;
@@ -73,12 +85,7 @@ Axis readAxis(Section& section, DesignKind design)
     const int ways = (section.has("values") ? 1 : 0) + (section.has("range") ? 1 : 0) + (section.has("log_range") ? 1 : 0);
     section.missingIf(ways != 1, "values", "one of values = [..], range = [low, high], log_range = [low, high]");
     if (section.has("values")) {
-        const toml::node* const node = section.node("values");
-        const toml::array* const list = node->as_array();
-        for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
-            axis.values.push_back(valueOf(section, "values", *list->get(i)));
-        }
-        section.refuseIf(axis.values.empty(), "values", "expected a list of values");
+        readValues(section, axis);
     } else {
         axis.log = section.has("log_range");
         readRange(section, axis.log ? "log_range" : "range", axis);
@@ -346,6 +353,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     readSlurm(top, plan.slurm);
     top.finish();
     checkColumns(top, plan);
+    checkVariables(top, plan, kind);
     checkKeys(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);

@@ -33,13 +33,20 @@ struct Axis {
     double low = 0, high = 0;      // of a range, both included
     std::size_t steps = 0;         // of a range in a grid
     bool log = false;              // even in the logarithm
-    bool whole = false;            // rounded to whole numbers
+    bool whole = false;            // whole numbers only
 
     /// In a grid.
     std::size_t levels() const noexcept { return values.empty() ? steps : values.size(); }
-    /// At a place in [0, 1) of the axis.
+    /// At a place in [0, 1) of the axis, as samples have it: each value of a list and each whole number of a range has an
+    /// equal part of [0, 1). Whole numbers of a logarithmic range are rounded.
     KeyValue at(double unit) const;
+    /// Of a grid or a list: whole numbers are rounded.
     KeyValue level(std::size_t index) const;
+    /// Where at(unit) lies between the first value (0) and the last one (1): of a list by its number there, of whole
+    /// numbers in the range, or in its logarithm.
+    double placeAt(double unit) const;
+    /// What formulas call a word of this axis: NAME_WORD.
+    std::string variableOf(const KeyValue& word) const;
 };
 
 /// A key that every case sets: to a value, or to that of a formula ("= depth_mm + 2").

@@ -87,6 +87,13 @@ void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::Ti
     datasets::withChanges(at->second, scene.tissueChanges);
 }
 
+// What formulas call an output, and what a reference case adds.
+std::vector<std::string> namesOf(const OutputInfo& output, bool compared)
+{
+    return compared ? std::vector<std::string>{output.name, "reference_" + output.name, output.name + "_change_pct"}
+                    : std::vector<std::string>{output.name};
+}
+
 }  // namespace
 
 void checkColumns(Section& top, const SweepPlan& plan)
@@ -102,6 +109,32 @@ void checkColumns(Section& top, const SweepPlan& plan)
     }
     for (const SweepOutput& o : plan.outputs) {
         insert("outputs", o.name);
+    }
+}
+
+void checkVariables(Section& top, const SweepPlan& plan, ProcedureKind kind)
+{
+    std::map<std::string, std::string> owners;  // by name in formulas: whose it is
+    for (const OutputInfo& o : outputsOf(kind)) {
+        for (const std::string& name : namesOf(o, !plan.reference.empty())) {
+            owners.emplace(name, "an output of the procedure");
+        }
+    }
+    const auto insert = [&](const std::string& name, const std::string& owner) {
+        const auto [there, isNew] = owners.emplace(name, owner);
+        top.refuseIf(
+            !isNew && there->second != owner, "axis",
+            fmt::format("formulas would call {} and {} alike, '{}': give one another name", there->second, owner, name));
+    };
+    for (const Axis& a : plan.axes) {
+        insert(a.name, fmt::format("axis '{}'", a.name));
+    }
+    for (const Axis& a : plan.axes) {
+        for (const KeyValue& value : a.values) {
+            if (!numberOf(value)) {
+                insert(a.variableOf(value), fmt::format("the word '{}' of axis '{}'", toText(value), a.name));
+            }
+        }
     }
 }
 
@@ -146,9 +179,8 @@ void probeOutputs(const SweepPlan& plan, const std::string& file)
     const SweepCase first = sweepCase(plan, 0);
     std::map<std::string, double> numbers = first.variables;
     for (const OutputInfo& o : outputsOf(first.procedure.kind)) {
-        numbers[o.name] = 1;
-        if (!plan.reference.empty()) {
-            numbers["reference_" + o.name] = numbers[o.name + "_change_pct"] = 1;
+        for (const std::string& name : namesOf(o, !plan.reference.empty())) {
+            numbers[name] = 1;
         }
     }
     for (const SweepOutput& output : plan.outputs) {

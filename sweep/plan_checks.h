@@ -11,6 +11,8 @@ namespace palpate::sweep {
 
 /// No two columns of the table have one name: small and capital letters are the same, as for SQLite.
 void checkColumns(datasets::Section& top, const SweepPlan& plan);
+/// No two names that formulas see are one: axes, the words of an axis (AXIS_WORD), and what a procedure of `kind` measures.
+void checkVariables(datasets::Section& top, const SweepPlan& plan, ProcedureKind kind);
 /// No key is set twice: by two axes, or by an axis and [procedure] or [set].
 void checkKeys(datasets::Section& top, const SweepPlan& plan);
 /// The scenes of some cases, spread evenly, and of one with each value of each list.

@@ -74,7 +74,7 @@ private:
     std::uint64_t ticks_ = 0;
 };
 
-// The force on the hand against a way, its work, and what gave way.
+// The force on the hand against a way, its work, and what gave way; `held` is the force of the tissue, which no cap cuts.
 struct Felt {
     double peak = 0, pull = 0, work = 0, held = 0, puncture = none;
     std::uint32_t punctures = 0, heldTicks = 0, contacts = 0;
@@ -97,7 +97,7 @@ struct Felt {
     }
     void hold(const TickRecord& r, Vec3 way)
     {
-        held += -glm::dot(r.basic, way);
+        held += -glm::dot(r.tissueForce, way);
         ++heldTicks;
         contacts = r.contacts;
     }
@@ -225,24 +225,25 @@ ProcedureResult wholeSession(const Run& run, const Procedure& p, std::uint64_t s
 std::vector<OutputInfo> outputsOf(ProcedureKind kind)
 {
     if (kind == ProcedureKind::press) {
-        return {{"force_n", "force of the tissue, mean over the last 20 ms of the hold"},
+        return {{"force_n", "force of the tissue on the tool, not capped; mean over the last 20 ms of the hold"},
                 {"peak_force_n", "largest force on the hand on the way in"},
                 {"stiffness_n_m", "force_n over the depth"},
                 {"work_mj", "work of the hand"},
                 {"contacts", "elements of tissue that the tool touched at the end"}};
     }
     if (kind == ProcedureKind::needle) {
-        return {{"puncture_force_n", "force at which the first tissue gave way"},
-                {"punctures", "tissues that gave way"},
-                {"peak_force_n", "largest force on the hand against the way in"},
-                {"force_n", "force of the tissue at the depth, mean over the last 20 ms of the hold"},
-                {"pull_n", "largest force on the way out"},
-                {"work_mj", "work of the hand, in and out"}};
+        return {
+            {"puncture_force_n", "force at which the first tissue gave way"},
+            {"punctures", "tissues that gave way"},
+            {"peak_force_n", "largest force on the hand against the way in"},
+            {"force_n", "force of the tissue on the needle at the depth, not capped; mean over the last 20 ms of the hold"},
+            {"pull_n", "largest force on the way out"},
+            {"work_mj", "work of the hand, in and out"}};
     }
     auto out = base::mapped<OutputInfo>(haptics::measures(), [&](const haptics::Measure& m) {
         return OutputInfo{m.key, "measure of the score, docs/score.md"};
     });
-    out.insert(out.end(), {{"peak_basic_n", "largest force of the tissue"},
+    out.insert(out.end(), {{"peak_basic_n", "largest force of the tissue as sent to the hand: capped, with limited slew"},
                            {"peak_additional_n", "largest additional force (DFFB)"},
                            {"energy_made_mj", "largest net energy given to the hand"},
                            {"punctures", "tissues that gave way"},

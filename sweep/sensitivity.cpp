@@ -104,6 +104,7 @@ std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<cons
 {
     const std::size_t axes = points.empty() ? 0 : points[0].size();
     std::vector<std::vector<double>> effects(axes);
+    std::vector<bool> moves(axes, false);
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {
         if ((i + 1) % (axes + 1) == 0) {
             continue;  // from one trajectory to the next
@@ -111,18 +112,20 @@ std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<cons
         for (std::size_t a = 0; a < axes; ++a) {
             const double step = points[i + 1][a] - points[i][a];
             const double effect = (outputs[i + 1] - outputs[i]) / step;
+            moves[a] = moves[a] || step != 0;
             if (step != 0 && std::isfinite(effect)) {
                 effects[a].push_back(effect);
             }
         }
     }
     std::vector<MorrisEffect> out;
-    for (const auto& e : effects) {
-        if (e.empty()) {
+    for (std::size_t a = 0; a < axes; ++a) {
+        const auto& e = effects[a];
+        if (e.empty() && moves[a]) {
             return {};
         }
         MorrisEffect effect;
-        effect.mean = meanOf(e);
+        effect.mean = e.empty() ? 0.0 : meanOf(e);
         for (const double v : e) {
             effect.absolute += std::abs(v) / static_cast<double>(e.size());
             effect.spread +=

@@ -25,8 +25,9 @@ struct MorrisEffect {
     double spread = 0;    // sigma: other than 0 where the axis acts with others, or not in proportion
 };
 
-/// Effects of every axis from the outputs at `points`, which are those of morrisPoints(). Steps from or to a value that is
-/// not finite are left out. Empty when an axis has none.
+/// Effects of every axis from the outputs at `points`: those of morrisPoints(), at the places that the axes could take
+/// (Axis::placeAt). A trajectory in which an axis keeps its place says nothing about it; one that never moves has no
+/// effect. Steps from or to a value that is not finite are left out. Empty when an axis that moves has none other.
 std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<const double> outputs);
 
 /// Fraction of the variance over a full grid that the mean at each value of an axis makes: the first-order index there.

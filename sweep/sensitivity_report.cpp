@@ -54,7 +54,13 @@ std::vector<std::vector<double>> bySobol(const SweepPlan& plan, const std::vecto
 
 std::vector<std::vector<double>> byMorris(const SweepPlan& plan, const std::vector<double>& means)
 {
-    return base::mapped<std::vector<double>>(morrisEffects(plan.points, means), [&](const MorrisEffect& e) {
+    UnitPoints places = plan.points;
+    for (auto& point : places) {
+        for (std::size_t a = 0; a < point.size(); ++a) {
+            point[a] = plan.axes[a].placeAt(point[a]);
+        }
+    }
+    return base::mapped<std::vector<double>>(morrisEffects(places, means), [&](const MorrisEffect& e) {
         return std::vector<double>{e.absolute, e.mean, e.spread};
     });
 }

@@ -105,6 +105,18 @@ CusumPlan readCusum(Section& section)
     return plan;
 }
 
+// The curriculum's file in the data folders; empty: none.
+fs::path fileCalled(const std::string& id)
+{
+    for (const fs::path& folder : dataFolders("curricula")) {
+        const fs::path file = folder / (id + ".toml");
+        if (id.find('/') == std::string::npos && fs::is_regular_file(file)) {
+            return file;
+        }
+    }
+    return {};
+}
+
 }  // namespace
 
 const Exercise* Curriculum::exercise(std::string_view name) const noexcept
@@ -162,14 +174,18 @@ Curriculum findCurriculum(const std::string& id)
     if (fs::path(id).extension() == ".toml") {
         return loadCurriculum(id);
     }
-    for (const fs::path& folder : dataFolders("curricula")) {
-        const fs::path file = folder / (id + ".toml");
-        if (id.find('/') == std::string::npos && fs::is_regular_file(file)) {
-            return loadCurriculum(file);
-        }
+    if (const fs::path file = fileCalled(id); !file.empty()) {
+        return loadCurriculum(file);
     }
     throw base::error("{}: there is no such curriculum{} (palpate curriculum list)", id,
                       base::meant(id, base::mapped<std::string>(allCurricula(), &Curriculum::id)));
+}
+
+std::string nameToFind(const Curriculum& curriculum)
+{
+    const fs::path named = fileCalled(curriculum.id);
+    std::error_code none;
+    return !named.empty() && fs::equivalent(named, curriculum.file, none) ? curriculum.id : curriculum.file.string();
 }
 
 std::pair<Curriculum, std::string> findExercise(const std::string& named)

@@ -52,6 +52,10 @@ std::vector<Curriculum> allCurricula(std::vector<std::string>* faults = nullptr)
 /// The curriculum called so, or in that file. Throws std::runtime_error, with the nearest name that there is.
 Curriculum findCurriculum(const std::string& id);
 
+/// What findCurriculum() takes for this one from any folder: its name, or its file where that name means no file or
+/// another.
+std::string nameToFind(const Curriculum& curriculum);
+
 /// The curriculum that "CURRICULUM/EXERCISE" names, as findCurriculum() does, and the id of the exercise, which it has.
 /// Throws std::runtime_error where it has none.
 std::pair<Curriculum, std::string> findExercise(const std::string& named);

@@ -175,9 +175,9 @@ std::string whatNext(const CurriculumProgress& c, const Person& person)
     const bool test = next->exercise->gate.testOnly && !next->gate.open;
     return fmt::format(
         "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre class=\"command\">palpate train --profile {} --exercise "
-        "{}/{}{}</pre>",
+        "{}{}</pre>",
         escape(next->exercise->title), escape(reasonFor(*next)), escape(base::shellWord(person.name)),
-        escape(c.curriculum->id), escape(next->exercise->id), test ? " --test" : "");
+        escape(base::shellWord(nameToFind(*c.curriculum) + "/" + next->exercise->id)), test ? " --test" : "");
 }
 
 std::string assumptions(const CusumPlan& plan)

@@ -102,7 +102,7 @@ function binsInWords(steps, a, groups, b) {
 function drawCurve(o, a, b) {
   const steps = levels(a), axis = data.axes[a];
   const groups = b === null ? [{ label: data.outputs[o], holds: () => true, whole: true }] : levels(b, mostCurves, 4);
-  const series = [];
+  const series = [], marks = data.marks.filter((m) => m.output === data.outputs[o]);
   groups.forEach((group, g) => {
     const rows = data.rows.filter((row) => group.whole || group.holds(row[b]));
     const points = curveOf(rows, a, o, steps), shade = colour("c" + (g % 8));
@@ -110,8 +110,9 @@ function drawCurve(o, a, b) {
     const band = [...points.map((p) => [p.x, p.high]), ...points.slice().reverse().map((p) => [p.x, p.low])];
     if (points.length > 1) {
       series.push({
-        name, type: "custom", silent: true, z: 1, data: [[0]], itemStyle: { color: shade }, tooltip: { show: false },
-        renderItem: (params, api) => ({ type: "polygon", shape: { points: band.map((p) => api.coord(p)) }, style: { fill: shade, opacity: 0.16 }, clipPath: null }),
+        // Its own points, else the part of the axes that is shown leaves it out or cuts it; the first of them draws it.
+        name, type: "custom", silent: true, z: 1, data: band, itemStyle: { color: shade }, tooltip: { show: false },
+        renderItem: (params, api) => (params.dataIndexInside > 0 ? null : { type: "polygon", shape: { points: band.map((p) => api.coord(p)) }, style: { fill: shade, opacity: 0.16 }, clipPath: null }),
         clip: true,
       });
     }
@@ -121,13 +122,15 @@ function drawCurve(o, a, b) {
       markLine: g > 0 ? undefined : {
         symbol: "none", silent: true, lineStyle: { color: colour("soft"), type: "dashed" },
         label: { formatter: "{b}", position: "insideEndTop", color: colour("soft") },
-        data: data.marks.filter((m) => m.output === data.outputs[o]).map((m) => ({ name: m.label, yAxis: m.at })),
+        data: marks.map((m) => ({ name: m.label, yAxis: m.at })),
       },
     });
   });
   byId("bins").textContent = binsInWords(steps, a, groups, b);
   legend.names = [...new Set(series.map((s) => s.name))];
   legend.rows = rowsOfLegend(legend.names, byId("curve").clientWidth);
+  // Draws nothing: the axis reaches to the marks as to the curves, whatever part of the width is shown.
+  series.push({ type: "custom", silent: true, data: marks.map((m) => [NaN, m.at]), tooltip: { show: false }, renderItem: () => null });
   const top = 20 + row * legend.rows;
   const x = axis.words
     ? { type: "category", data: steps.map((s) => s.label) }

@@ -166,14 +166,31 @@ TEST(ScoreCommand, OneSessionIsNoGroup)
 TEST(ScoreCommand, ValuesThatArePrintedTheSameAreTies)
 {
     const synthetic::Folder folder;
-    const std::string a = session(folder, "a", 0.02001, 1), b = session(folder, "b", 0.02001, 1),
-                      c = session(folder, "c", 0.02002, 1), d = session(folder, "d", 0.02002, 1);
+    const std::string a = session(folder, "a", 0.02001, 1), b = session(folder, "b", 0.02001, 2),
+                      c = session(folder, "c", 0.02002, 1), d = session(folder, "d", 0.02002, 2);
     score({"--group", "new=" + a + "," + b, "--group", "old=" + c + "," + d, "--json", (folder / "f.json").string(),
            "--report", (folder / "f.html").string()});
     EXPECT_EQ(readJson(folder / "f.json")["effect_size"]["deepest_mm"], 0);
     const std::string page = fileText(folder / "f.html");
     EXPECT_NE(page.find("Deepest insertion [mm] 20.0"), std::string::npos) << "it is the same in all sessions";
     EXPECT_EQ(page.find("aria-label=\"Deepest insertion\""), std::string::npos);
+}
+
+// Counted twice it would move medians and make a group of one session two.
+TEST(ScoreCommand, ARecordIsInAGroupOnce)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.01, 1), b = session(folder, "b", 0.02, 1);
+    const std::string copy = (folder / "copy").string(), other = folder.path().string() + "/./a";
+    std::filesystem::copy_file(a, copy);
+    for (const std::string& again : {a, copy, other}) {
+        const std::string error = tests::errorOf([&] { score({"--group", "x=" + a + "," + b + "," + again}); });
+        EXPECT_NE(error.find(again + " is the record " + a + ", which is in this group already"), std::string::npos)
+            << error;
+        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+    score({"--group", "x=" + a + "," + b, "--group", "y=" + a, "--json", (folder / "f.json").string()});
+    EXPECT_EQ(readJson(folder / "f.json")["groups"][1]["n"], 1) << "it may be in two groups";
 }
 
 TEST(ScoreCommand, WrongRequestsAreToldOnOneLine)

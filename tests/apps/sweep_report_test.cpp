@@ -190,6 +190,41 @@ TEST(SweepReport, ATooltipShowsNamesAsTheyAre)
     EXPECT_EQ(page.find("<i class=\"it\""), std::string::npos);
 }
 
+// The bands of a chart of curves, as paths: "M74 268.36L550 208.72...Z".
+std::vector<std::string> bandsOf(const std::string& curve)
+{
+    std::vector<std::string> all;
+    for (auto at = curve.find("fill-opacity=\"0.16\""); at != std::string::npos;
+         at = curve.find("fill-opacity=\"0.16\"", at + 1)) {
+        const auto path = curve.rfind(" d=\"", at) + 4;
+        all.push_back(curve.substr(path, curve.find('"', path) - path));
+    }
+    return all;
+}
+
+// The band is drawn although x = 0 is not on the axis, and lies in the chart as a whole; so does a mark beyond all medians.
+TEST(SweepReport, BandsAndMarksAreWithinTheChart)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    writeText(here / "p.toml", shortPlan(1) + "[[mark]]\noutput = \"force_n\"\nat = 50\nlabel = \"felt\"\n");
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    figures({"sweep", "--report", here / "s"});
+    const std::string address =
+        "file://" + std::string(here / "s" / "report.html") + "#x=youngs_kpa&by=(all+together)&output=";
+    EXPECT_NE(partOf(documentOf(address + "force_n", here / "profile"), "curve").find(">felt<"), std::string::npos);
+
+    const auto bands = bandsOf(partOf(documentOf(address + "work_mj", here / "profile"), "curve"));
+    ASSERT_EQ(bands.size(), 1U);
+    EXPECT_EQ(std::ranges::count(bands[0], 'L'), 5);  // two corners at each of three points
+    constexpr double top = 44;                        // of the curves, below one row of the legend [px]
+    for (auto at = bands[0].find(' '); at != std::string::npos; at = bands[0].find(' ', at + 1)) {
+        EXPECT_GE(std::stod(bands[0].substr(at)), top) << bands[0];
+    }
+}
+
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.
 TEST(SweepReport, IsDrawnByABrowserFromOneFile)
 {

@@ -105,6 +105,13 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
     EXPECT_NE(readText(csv).find("\nb,bert,2,"), std::string::npos) << readText(csv);
     EXPECT_EQ(nlohmann::json::parse(readText(xapi)).size(), 2U);
     expectRefusal({"progress", "--group", "a=Smith,bert,nobody"}, "nobody: there is no such profile");
+    expectRefusal({"progress", "--group", "a=bert,bert"}, "--group a=bert,bert: bert is in this group already");
+    expectRefusal({"progress", "--group", "a=bert", "--group", "a=Smith,Jane,bert", "--group", "b=bert"},
+                  "--group a=Smith,Jane,bert: bert is in this group already");
+    EXPECT_EQ(palpate({"progress", "--group", "a=bert", "--group", "b=bert"}).status, 0);
+    for (const char* const option : {"--case", "--exercise"}) {
+        expectRefusal({"progress", "bert", option, "layered"}, std::string(option) + " requires --group");
+    }
     for (const char* const option : {"--html", "--csv", "--xapi"}) {
         expectRefusal({"progress", "bert", option, "-"}, "this output goes to a file");
     }
@@ -346,6 +353,49 @@ TEST_F(TrainingCommands, ProgressShowsWhatWasNotBegunToo)
     ASSERT_EQ(palpate({"profile", "hand", "anna", "left"}).status, 0);
     EXPECT_EQ(figures({"profile", "list"})["profiles"][0]["hand"], "left");
     expectRefusal({"profile", "hand", "bert", "left"}, "there is no such profile");
+}
+
+// A session says which curriculum it was of, and not where that lies.
+TEST_F(TrainingCommands, TheNextExerciseIsFoundWhereACurriculumIsMissing)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    writeText(folder_ / "course.toml",
+              "title = \"A course\"\n[[exercise]]\nid = \"touch\"\ntitle = \"Touch\"\ncase = \"first-touch\"\n"
+              "[[exercise.level]]\nmeasure = \"total\"\nat_least = 50\n");
+    const auto practise = [&](const std::string& exercise) {
+        return palpate({"train", "--profile", "anna", "--exercise", exercise, "--headless", "--unpaced", "--setting",
+                        "fast", "--seconds", "2"});
+    };
+    const auto next = [] { return palpate({"curriculum", "next", "--profile", "anna"}); };
+    ASSERT_EQ(practise((folder_ / "course.toml").string() + "/touch").status, 0);
+    const Outcome first = next();
+    EXPECT_EQ(first.status, 0) << first.err;
+    EXPECT_NE(first.err.find("palpate: warning: sessions of a missing curriculum are not counted: course: "),
+              std::string::npos)
+        << first.err;
+    EXPECT_EQ(std::ranges::count(first.err, '\n'), 1) << first.err;
+    EXPECT_NE(first.out.find("palpation: "), std::string::npos) << "all that there are: " << first.out;
+    ASSERT_EQ(session("touch", {"--seconds", "2"}).status, 0);
+    ASSERT_EQ(practise((folder_ / "course.toml").string() + "/touch").status, 0);
+    const Outcome second = next();
+    EXPECT_NE(second.out.find("breast-core-biopsy: "), std::string::npos) << second.out << second.err;
+    EXPECT_EQ(second.out.find("palpation: "), std::string::npos) << second.out;
+}
+
+// Of two simulated people the median lies between them, and quartiles a quarter of the way from each.
+TEST_F(TrainingCommands, MediansOfSimulatedPeopleLieBetweenNeighbours)
+{
+    const auto sessions = [](const std::string& seed, const std::string& people) {
+        const auto skills = figures({"curriculum", "simulate", "palpation", "--people", people, "--seed", seed});
+        return skills["skills"][0]["sessions"];
+    };
+    const double one = sessions("1", "1")["max"], two = sessions("2", "1")["max"];
+    ASSERT_NE(one, two);
+    const auto both = sessions("1", "2");
+    EXPECT_DOUBLE_EQ(both["median"], (one + two) / 2);
+    EXPECT_DOUBLE_EQ(both["lower_quartile"], std::min(one, two) + std::abs(one - two) / 4);
+    EXPECT_DOUBLE_EQ(both["upper_quartile"], std::max(one, two) - std::abs(one - two) / 4);
+    EXPECT_EQ(both["max"], std::max(one, two));
 }
 
 // The full check is the command without these options.

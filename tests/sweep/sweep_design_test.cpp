@@ -1,12 +1,16 @@
 #include <base/rank_correlation.h>
 #include <sweep/design.h>
+#include <sweep/plan.h>
+#include <sweep/report.h>
 #include <sweep/sensitivity.h>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -186,6 +190,56 @@ TEST(MorrisEffects, OfALinearFunctionAreItsSlopesAndOfAProductSpread)
     const auto product = morrisEffects(points, outputsAt(points, [](const auto& x) { return x[0] * x[1]; }));
     EXPECT_GT(product[0].spread, 0.1);
     EXPECT_NEAR(product[2].absolute, 0, 1e-9);
+}
+
+SweepPlan screening()
+{
+    const auto axis = [](const char* name, std::vector<KeyValue> values) {
+        Axis a;
+        a.name = name;
+        a.values = std::move(values);
+        a.high = 1;
+        return a;
+    };
+    SweepPlan plan;
+    plan.design = DesignKind::morris;
+    plan.axes = {axis("a", {}), axis("b", {0.0, 1.0}),          axis("w", {"x", "y"}), axis("k", {}),
+                 axis("l", {}), axis("three", {0.0, 0.5, 1.0}), axis("one", {0.0})};
+    plan.axes[3].whole = plan.axes[4].whole = plan.axes[4].log = true;
+    plan.axes[4].low = 1;
+    plan.axes[4].high = 100;
+    plan.outputs = {{"y", ""}};
+    plan.points = morrisPoints(6, plan.axes.size(), 2);
+    return plan;
+}
+
+// y = a + b + w_y + k + ln(l) / ln(100) + three has an effect of 1 over the whole range of each axis, although axes of
+// values and of whole numbers move by more than Morris's step. An axis with one value has none, and leaves the ranking
+// there.
+TEST(MorrisEffects, OfListsWordsAndWholeNumbersAreOverTheRangeToo)
+{
+    const SweepPlan plan = screening();
+    std::vector<std::optional<SweepRow>> rows;
+    for (std::size_t i = 0; i < plan.cases(); ++i) {
+        const auto v = sweepPoint(plan, i).variables;
+        SweepRow& row = rows.emplace_back(SweepRow()).value();
+        row.index = i;
+        row.outputs = {v.at("a") + v.at("b") + v.at("w_y") + v.at("k") + std::log(v.at("l")) / std::log(100.0) +
+                       v.at("three")};
+    }
+    const auto ranked = sensitivity(plan, rows)["outputs"]["y"];
+    ASSERT_EQ(ranked.size(), 7U);
+    for (const auto& entry : ranked) {
+        EXPECT_NEAR(entry["values"][0].get<double>(), entry["axis"] == "one" ? 0 : 1, 1e-9) << entry;
+        EXPECT_NEAR(entry["values"][2].get<double>(), 0, 1e-6) << entry;
+    }
+}
+
+TEST(MorrisEffects, AreNoneWhereAnAxisMovesAndNoCaseIsThere)
+{
+    const UnitPoints points{{0, 0}, {1, 0}, {1, 1}};
+    EXPECT_TRUE(morrisEffects(points, std::vector<double>{1, std::nan(""), 3}).empty());
+    EXPECT_EQ(morrisEffects({{0, 0}, {1, 0}, {1, 0}}, std::vector<double>{1, 3, 3}).at(0).mean, 2);
 }
 
 // Over a whole grid the shares of an additive function add up to 1, each its own variance.

@@ -110,6 +110,17 @@ TEST(Formula, IsMissingWhereANumberInItIs)
     EXPECT_THROW(evaluate("a = 5", {{"a", 1}}), std::runtime_error);
 }
 
+// muParser takes the last of several values: 0,5 was 5.
+TEST(Formula, RefusesADecimalComma)
+{
+    for (const char* formula : {"0,5", "a * 0,5", "1 + (a, 2)"}) {
+        const std::string error = tests::errorOf([&] { evaluate(formula, {{"a", 2}}); });
+        EXPECT_TRUE(error.starts_with("formula '" + std::string(formula) + "': ")) << formula << ": " << error;
+    }
+    EXPECT_EQ(tests::errorOf([] { evaluate("0,5", {}); }), "formula '0,5': has several values: write a decimal point");
+    EXPECT_EQ(evaluate("max(1, 5) * 0.5", {}), 2.5);
+}
+
 TEST(SweepPlan, FormulasRangesAndConstraints)
 {
     const SweepPlan plan = planOf(
@@ -181,6 +192,18 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + axis("dffb.gain", "[1]") + "[procedure]\ntrainee = \"novice\"\nkind = \"press\"\n",
          "a procedure of kind press has the keys depth_mm"},
         {scene + axis("procedure.depth_mm", "[1]"), "a procedure of kind session has the keys trainee"},
+        {scene + axis("dffb.gain", "[1]") + "[procedure]\nseconds = \"= 0,5\"\n", "write a decimal point"},
+        {scene + "[[axis]]\nname = \"x\"\nvalues = [1, \"two\", 3]\n", "only numbers or only words"},
+        {scene + "[[axis]]\nname = \"x\"\nvalues = [true, 2.5]\n", "only numbers or only words"},
+        {scene + "[[axis]]\nname = \"w\"\nvalues = [\"a-b\", \"a b\"]\n",
+         "the word 'a-b' of axis 'w' and the word 'a b' of axis 'w' alike, 'w_a_b'"},
+        {scene + "[[axis]]\nname = \"a\"\nvalues = [\"b\"]\n[[axis]]\nname = \"a_b\"\nvalues = [5]\n",
+         "axis 'a_b' and the word 'b' of axis 'a' alike"},
+        {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n\"\nvalues = [1]\n",
+         "an output of the procedure and axis 'force_n' alike"},
+        {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n_change_pct\"\n"
+                 "values = [1]\n[reference]\ndffb.gain = 0\n",
+         "an output of the procedure and axis 'force_n_change_pct' alike"},
     };
     for (const auto& [text, hint] : wrong) {
         const std::string error = refusal(text);
@@ -188,6 +211,14 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         EXPECT_TRUE(error.starts_with("plan.toml")) << error;
         EXPECT_EQ(error.find('\n'), std::string::npos) << error;
     }
+}
+
+// What formulas cannot mix up is let through: a word that comes twice, and what only another procedure measures.
+TEST(SweepPlan, NamesThatDifferAreNotRefused)
+{
+    EXPECT_EQ(refusal("scene = \"block\"\n[design]\nkind = \"list\"\n[[axis]]\nname = \"w\"\nvalues = [\"a\", \"b\", "
+                      "\"a\"]\n[[axis]]\nname = \"force_n\"\nvalues = [1, 2.5, 3]\n"),
+              "");
 }
 
 // 61 x 61 cases, of which 60 are tried evenly, every 63rd: none of them has the one wrong value.
@@ -226,6 +257,23 @@ TEST(SweepPlan, TriesTissuesOfVolumesAndReferences)
         const std::string error = refusal(body + fat + "[reference]\ntissue.fatt.youngs_kpa = 3\n");
         EXPECT_NE(error.find("case 0: [tissue.fatt]: is not in the volume's tissue table"), std::string::npos) << error;
     }
+}
+
+// Each whole number has an equal part of the samples: of 60 strata 20. Rounding gave the ends half of the others' share.
+// A grid has both ends and rounds between them, as before.
+TEST(SweepPlan, WholeNumbersAreSampledAlike)
+{
+    const std::string axis = "[[axis]]\nname = \"k\"\nwhole = true\nrange = [-1, 1]\n";
+    const auto counts = [](const SweepPlan& plan) {
+        std::map<double, int> out;
+        for (std::size_t i = 0; i < plan.cases(); ++i) {
+            ++out[sweepPoint(plan, i).variables.at("k")];
+        }
+        return out;
+    };
+    EXPECT_EQ(counts(planOf("[design]\nkind = \"latin_hypercube\"\nsamples = 60\n" + axis)),
+              (std::map<double, int>{{-1, 20}, {0, 20}, {1, 20}}));
+    EXPECT_EQ(counts(planOf(axis + "steps = 5\n")), (std::map<double, int>{{-1, 2}, {0, 1}, {1, 2}}));
 }
 
 TEST(SweepPlan, ReadyPlansAreWhole)
@@ -343,6 +391,24 @@ TEST(CaseRunner, ForceContrastFallsWithDepthAndRisesWithSizeAndStiffness)
     EXPECT_GT(middle, contrast(20, 10, 10));
     EXPECT_GT(contrast(10, 6, 10), 0.0);
     EXPECT_NEAR(contrast(3.25, 10, 6), 0.0, 0.05);
+}
+
+// F = K d: 1 N/mm, 10 mm deep. The hand gets at most the device's 8.5 N, and after a fast press less for some ticks.
+TEST(CaseRunner, TheForceOfAPressIsThatOfTheTissueAndNotWhatTheHandGets)
+{
+    const SweepPlan plan = parsePlan(
+        "scene = \"block\"\noutputs = [\"force_n\", \"stiffness_n_m\", \"peak_force_n\"]\n"
+        "[[axis]]\nkey = \"procedure.hold_ms\"\nvalues = [1, 60]\n"
+        "[procedure]\nkind = \"press\"\ndepth_mm = 10\nspeed_mm_s = 2000\n"
+        "[set]\nvolume.voxel_mm = 4\nmodel.level = \"spring\"\nmodel.stiffness_n_m = 1000\n",
+        "plan.toml", namedScene);
+    CaseRunner runner(plan, "test");
+    for (const std::size_t hold : {0U, 1U}) {
+        const CaseRow row = runner.run(hold);
+        EXPECT_NEAR(row.outputs[0], 10, 0.01) << hold;
+        EXPECT_NEAR(row.outputs[1], 1000, 1) << hold;
+        EXPECT_LT(row.outputs[2], 9) << hold;
+    }
 }
 
 // A late force is felt late: the same hand, another session.

@@ -13,6 +13,8 @@
 #include <regex>
 #include <set>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 namespace palpate::training {
 namespace {
@@ -24,10 +26,10 @@ std::string textOf(const std::filesystem::path& file)
 }
 
 struct Somebody {
-    Curriculum curriculum = breastCourse();
+    Curriculum curriculum;
     std::vector<PersonProgress> people;
 
-    explicit Somebody(const std::string& name)
+    explicit Somebody(const std::string& name, Curriculum course = breastCourse()) : curriculum(std::move(course))
     {
         PersonProgress p;
         p.person.name = name;
@@ -58,6 +60,30 @@ TEST(ProgressPage, SaysWhatIsNextAndWhatTheChartAssumes)
         EXPECT_NE(page.find("\"" + (*at)[1].str() + "\":{"), std::string::npos);
     }
     EXPECT_GE(places.size(), 4U);
+}
+
+// The name stands for the file that comes along; of another file it would be none, or the wrong one.
+TEST(ProgressPage, NamesTheNextExerciseAsAShellTakesIt)
+{
+    const tests::Folder folder;
+    Curriculum known = breastCourse();
+    known.cusum.alpha = known.cusum.beta = 0.4;  // short charts, whose run lengths take no time
+    known.exercises.resize(1);
+    known.exercises[0].id = "touch it";
+    known.exercises[0].gate.pass = known.exercises[0].gate.of = 100;
+    Curriculum own = known, other = known;
+    own.id = "my own";
+    own.file = other.file = folder / "my own.toml";
+    std::filesystem::copy_file(known.file, own.file);
+    const Somebody one("Eve", known), two("Eve", own), three("Eve", other);
+    writeProgressPage(folder / "p.html", {one.people[0], two.people[0], three.people[0]}, {});
+    const std::string page = textOf(folder / "p.html"), file = own.file.string();
+    const std::regex command("--exercise &#39;(.*?)&#39;</pre>");
+    std::vector<std::string> named;
+    for (std::sregex_iterator at(page.begin(), page.end(), command); at != std::sregex_iterator(); ++at) {
+        named.push_back((*at)[1]);
+    }
+    EXPECT_EQ(named, (std::vector<std::string>{"breast-core-biopsy/touch it", file + "/touch it", file + "/touch it"}));
 }
 
 // Of a measure without a unit as well: "at most" alone says nothing.
