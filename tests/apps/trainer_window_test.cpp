@@ -253,6 +253,20 @@ TEST(TrainerWindow, EscapeAsksBeforeItEndsASession)
     EXPECT_TRUE(t.desktop.window("^Palpate$", longEnough).empty());
 }
 
+TEST(TrainerWindow, ASignalEndsTheSessionThatItHasStarted)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Trainer t;
+    const auto eyes = t.sessionBy([&] { t.key("Return"); });
+    ASSERT_TRUE(eyes);
+    t.program->send(SIGTERM);
+    const Outcome outcome = t.program->wait();
+    EXPECT_EQ(outcome.status, 128 + SIGTERM);
+    EXPECT_EQ(outcome.err, "palpate-trainer: interrupted\n");
+    EXPECT_EQ(eyes->ending(), channel::Ending::finished) << "in order, with its record";
+}
+
 TEST(TrainerWindow, PalpateAloneOpensItOnADesktopAndItsHelpElsewhere)
 {
     if (!can())

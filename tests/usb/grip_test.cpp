@@ -211,7 +211,7 @@ TEST(Grip, ItsButtonsWorkTheScreensAndASessionGetsTheFalcon)
     ASSERT_TRUE(bench.press(buttonCentre, at("Case")));
     // Whoever has the Falcon lets it go before the kernel is gone.
     window.trainer->send(SIGTERM);
-    window.trainer->wait();
+    EXPECT_EQ(window.trainer->wait().status, 128 + SIGTERM);
     EXPECT_TRUE(waitFor([&] { return !bench.kernel.claimed; }));
 }
 
