@@ -216,6 +216,15 @@ class Files(InFolder):
                 with self.assertRaisesRegex(palpate.Error, wrong):
                     palpate.Volume.import_(file, set={"1": "fat"})
 
+    def test_a_damaged_description_is_said_in_plain_text(self):
+        file = self.folder / "v.vdb"
+        palpate.Volume.from_numpy(cube(), AFFINE, TISSUES).save(file)
+        whole = file.read_bytes()
+        self.assertIn(b'"format":', whole)
+        file.write_bytes(whole.replace(b'"format":', b'"form\xff\xfe":'))
+        with self.assertRaisesRegex(palpate.Error, "v.vdb: is damaged"):
+            palpate.Volume.open(file)
+
     def test_errors_name_the_file(self):
         with self.assertRaisesRegex(palpate.Error, "nothing.vdb"):
             palpate.Volume.open(self.folder / "nothing.vdb")
