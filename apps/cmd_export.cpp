@@ -101,6 +101,7 @@ void checkUse(const CLI::App& command, const ExportArguments& o)
     refuse("--width", picture, "is for an ultrasound picture, and not with --like");
     refuse("--height", ct || picture, "is for a CT scan or an ultrasound picture, and not with --like");
     refuse("--window", ct, "is for a CT scan");
+    refuse("--nifti2", volume::isNifti(o.output), "is for .nii and .nii.gz");
 }
 
 double timeFrom(const std::string& text)

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace palpate::datasets {
@@ -65,6 +66,10 @@ PhantomValues checkedValues(const PhantomSpec& spec, const std::vector<PhantomPa
     }
     const auto refuse = [&](const std::string& name) {
         const auto known = base::mapped<std::string>(parameters, &PhantomParameter::name);
+        if (const auto p = std::ranges::find(parameters, name, &PhantomParameter::name); p != parameters.end()) {
+            throw base::error("phantom '{}': {}: must be {}", spec.name, name,
+                              p->word.empty() ? "a number" : fmt::format("a name, as \"{}\" is", p->word));
+        }
         throw base::error("phantom '{}': no such parameter '{}'; it takes {}", spec.name, name, fmt::join(known, ", "));
     };
     for (const auto& [name, value] : spec.numbers) {
@@ -93,6 +98,21 @@ volume::Provenance provenance(const PhantomSpec& spec, const PhantomValues& valu
     return out;
 }
 
+// Every part that was asked for is there: one thinner than a voxel may have the centre of none.
+void checkParts(const PhantomSpec& spec, const PhantomValues& values, const PhantomLabels& labels)
+{
+    std::vector<bool> there(65536, false);
+    for (const std::uint16_t v : labels.image.values) {
+        there[v] = true;
+    }
+    for (const PhantomPart& part : labels.parts) {
+        base::failIf(!there[part.label],
+                     "phantom '{}': {} = {:g} mm: no voxel of {:g} mm has its centre there: choose "
+                     "smaller voxels",
+                     spec.name, part.parameter, values.number(part.parameter), voxelEdge(labels.image));
+    }
+}
+
 }  // namespace
 
 std::vector<std::string> phantomNames()
@@ -117,6 +137,7 @@ volume::Tissue makePhantom(const PhantomSpec& spec, const volume::TissueTable& t
                      name, word, table.name);
     }
     const PhantomLabels labels = maker.make(values);
+    checkParts(spec, values, labels);
     return volume::Tissue::fromLabels(labels.image, table, labels.names, provenance(spec, values));
 }
 

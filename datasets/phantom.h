@@ -37,7 +37,7 @@ std::vector<PhantomParameter> phantomParameters(const std::string& name);
 /// Builds a phantom. Patient frame: the chest wall is behind (+y), the nipple in front (-y). Structures carry the names
 /// "skin", "fat", "gland", "ligament", "duct", "artery", "vein", "muscle", "rib", "nipple", "chest_wall", "tumour"
 /// ("tumour_2", ..). Throws std::runtime_error for an unknown name, parameter or a value out of range (value, unit and
-/// range in the message).
+/// range in the message), and for a layer or tumour that is too small for the voxels to have one.
 volume::Tissue makePhantom(const PhantomSpec& spec, const volume::TissueTable& table);
 
 }  // namespace palpate::datasets

@@ -168,8 +168,9 @@ std::vector<PhantomParameter> breastParameters()
             {"tumours", "", "how many", 0, 6, 1, "", true},
             {"tumour_diameter_mm", "mm", "diameter of the sphere of the tumour's volume", 4, 40, 15, ""},
             {"tumour_depth_mm", "mm",
-             "from the outside of the skin to the nearest point of the first tumour; the others lie up to so deep", 4, 50,
-             15, ""},
+             "along the normal of the skin in front of the first tumour, to its nearest point (the shortest way to curved "
+             "skin is up to a tenth less); the others lie up to so deep",
+             4, 50, 15, ""},
             {"tumour_kind", "", "a tissue of the table", 0, 0, 0, "idc_high_grade"}};
 }
 
@@ -204,8 +205,11 @@ PhantomLabels breastPhantom(const PhantomValues& values)
         }
     });
     drawTrees(image, trees);
+    out.parts = {{skin, "skin_mm"}};
     for (std::size_t t = 0; t < tumours.size(); ++t) {
-        drawLump(image, tumours[t], static_cast<std::uint16_t>(tumour + t));
+        const auto label = static_cast<std::uint16_t>(tumour + t);
+        drawLump(image, tumours[t], label);
+        out.parts.push_back({label, "tumour_diameter_mm"});
     }
     closeSkin(image);
     out.names = labelNames(tumours.size(), values.word("tumour_kind"));

@@ -25,10 +25,17 @@ struct PhantomValues {
     const std::string& word(const std::string& name) const { return words.at(name); }
 };
 
+/// A part of a phantom, and the parameter that says how large it is [mm].
+struct PhantomPart {
+    std::uint16_t label = 0;
+    std::string parameter;
+};
+
 /// A phantom's voxels and what they mean.
 struct PhantomLabels {
     volume::LabelImage image;
     std::vector<volume::LabelName> names;
+    std::vector<PhantomPart> parts;  // that must have a voxel at least
 };
 
 PhantomLabels breastPhantom(const PhantomValues& values);

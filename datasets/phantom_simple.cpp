@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 
 namespace palpate::datasets {
 
@@ -67,6 +68,12 @@ PhantomLabels layeredPhantom(const PhantomValues& values)
     }
     const double thickness = layers.back().depth;
     PhantomLabels out;
+    for (const PhantomPart& layer : std::initializer_list<PhantomPart>{
+             {1, "skin_mm"}, {2, "fat_mm"}, {3, "gland_mm"}, {4, "muscle_mm"}, {5, "bone_mm"}}) {
+        if (values.number(layer.parameter) > 0) {
+            out.parts.push_back(layer);
+        }
+    }
     out.image = phantomImage(values, Vec3(-half, -airInFront, -half), Vec3(half, thickness, half));
     forEachRow(out.image, [&](int j, int k) {
         for (int i = 0; i < out.image.size.x; ++i) {
@@ -87,6 +94,7 @@ PhantomLabels layeredPhantom(const PhantomValues& values)
         const double across = std::max({-low.x, -low.z, high.x, high.z});
         requireRoom(lump.centre.y + high.y < layers[3].depth && across < half, "layered", values);
         drawLump(out.image, lump, tumourLabel);
+        out.parts.push_back({tumourLabel, "tumour_diameter_mm"});
     }
     out.names = {{0, "air", "air"},
                  {1, "skin", "skin"},
@@ -141,7 +149,12 @@ PhantomLabels blockPhantom(const PhantomValues& values)
                  {2, values.word("tissue"), values.word("tissue")},
                  {5, "base", "bone"},
                  {tumourLabel, "tumour", values.word("tumour_kind")}};
+    out.parts = {{5, "base_mm"}};
+    if (radius > 0) {
+        out.parts.push_back({tumourLabel, "tumour_diameter_mm"});
+    }
     if (two) {
+        out.parts.push_back({secondTumourLabel, "tumour_diameter_mm"});
         out.names.push_back({secondTumourLabel, "tumour_2", values.word("tumour_kind")});
     }
     return out;

@@ -196,6 +196,7 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
     map.values.assign(labels.data(), labels.data() + labels.size());
     checkGrid(map);
     std::optional<volume::CompanionImage> companion;
+    refuseIf(image.is_none() && !unit.empty(), "image_unit: needs the image: give image too");
     if (!image.is_none()) {
         const auto values = Image::ensure(arrayOf(image, "image"));
         if (!values) {

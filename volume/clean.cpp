@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <map>
 
 namespace palpate::volume {
@@ -37,25 +39,107 @@ void forEachRun(const Pieces& pieces, Index3 size, const Visit& visit)
     }
 }
 
-// Adds the labels of the faces around a run to `seen`; its own piece is of label `own` and its other runs have that too, so
-// faces to that label are inside the piece.
-void addFaces(const LabelImage& image, const RowRun& run, int y, int z, std::map<std::uint16_t, std::uint64_t>& seen)
-{
-    const std::uint16_t own = image.values[image.offset({run.first, y, z})];
-    const auto look = [&](Index3 n) {
-        if (base::holds(image.size, n) && image.values[image.offset(n)] != own) {
-            ++seen[image.values[image.offset(n)]];
-        }
-    };
-    look({run.first - 1, y, z});
-    look({run.last + 1, y, z});
-    for (int x = run.first; x <= run.last; ++x) {
-        look({x, y - 1, z});
-        look({x, y + 1, z});
-        look({x, y, z - 1});
-        look({x, y, z + 1});
+constexpr std::uint32_t firstPiece = 65536;  // keys of faces: below it labels, from it on roots of loose pieces
+
+// Faces around a piece, by what is behind them.
+using Faces = std::map<std::uint32_t, std::uint64_t>;
+
+// Finds what loose pieces become. One that lies in another loose piece becomes what that becomes.
+class LoosePieces {
+public:
+    LoosePieces(const LabelImage& image, const Pieces& pieces, const std::vector<char>& loose)
+        : image_(image), pieces_(pieces), loose_(loose)
+    {
+        forEachRun(pieces, image.size, [&](std::uint32_t i, int y, int z) {
+            if (loose[pieces.root(i)] != 0) {
+                addFaces(i, y, z, around_[pieces.root(i)]);
+            }
+        });
     }
-}
+
+    // The new label of each, by root. Those whose faces are mostly to what stays are first, and count as staying then;
+    // where loose pieces only have each other, their other faces count.
+    std::map<std::uint32_t, std::uint16_t> resolve()
+    {
+        while (!around_.empty()) {
+            std::map<std::uint32_t, std::uint16_t> now = decided(false);
+            now = now.empty() ? decided(true) : now;
+            for (const auto& [root, label] : now) {
+                around_.erase(root);
+            }
+            for (auto& [root, seen] : around_) {
+                replace(seen, now);
+            }
+            label_.merge(now);
+        }
+        return std::move(label_);
+    }
+
+private:
+    // Adds what is behind the faces around a run; its own piece is of label `own` and its other runs have that too, so
+    // faces to that label are inside the piece.
+    void addFaces(std::uint32_t run, int y, int z, Faces& seen) const
+    {
+        const RowRun& of = pieces_.runs()[run];
+        const std::uint16_t own = image_.values[image_.offset({of.first, y, z})];
+        const auto look = [&](Index3 n) {
+            if (base::holds(image_.size, n) && image_.values[image_.offset(n)] != own) {
+                ++seen[keyOf(n)];
+            }
+        };
+        look({of.first - 1, y, z});
+        look({of.last + 1, y, z});
+        for (int x = of.first; x <= of.last; ++x) {
+            look({x, y - 1, z});
+            look({x, y + 1, z});
+            look({x, y, z - 1});
+            look({x, y, z + 1});
+        }
+    }
+
+    std::uint32_t keyOf(Index3 n) const
+    {
+        const auto [begin, end] = pieces_.row(n.y, n.z);
+        const auto runs = pieces_.runs().subspan(begin, end - begin);
+        const auto run = std::ranges::lower_bound(runs, n.x, {}, &RowRun::last);
+        const bool inPiece = run != runs.end() && run->first <= n.x;
+        return inPiece && loose_[run->parent] != 0 ? firstPiece + run->parent : image_.values[image_.offset(n)];
+    }
+
+    // What can be told now: of those with most faces to a label, or (`anyFace`) of those with any. Nothing around: outside.
+    std::map<std::uint32_t, std::uint16_t> decided(bool anyFace) const
+    {
+        std::map<std::uint32_t, std::uint16_t> out;
+        const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
+        for (const auto& [root, seen] : around_) {
+            const auto most = std::max_element(seen.begin(), anyFace ? seen.lower_bound(firstPiece) : seen.end(), fewer);
+            if (seen.empty()) {
+                out[root] = 0;
+            } else if (most != seen.end() && most->first < firstPiece) {
+                out[root] = static_cast<std::uint16_t>(most->first);
+            }
+        }
+        return out;
+    }
+
+    static void replace(Faces& seen, const std::map<std::uint32_t, std::uint16_t>& labels)
+    {
+        for (auto at = seen.lower_bound(firstPiece); at != seen.end();) {
+            if (const auto label = labels.find(at->first - firstPiece); label != labels.end()) {
+                seen[label->second] += at->second;
+                at = seen.erase(at);
+            } else {
+                ++at;
+            }
+        }
+    }
+
+    const LabelImage& image_;
+    const Pieces& pieces_;
+    const std::vector<char>& loose_;                // by root
+    std::map<std::uint32_t, Faces> around_;         // of those that are open, by root
+    std::map<std::uint32_t, std::uint16_t> label_;  // of the others
+};
 
 // Marks with 1 the air that hangs together with the border of the volume.
 std::vector<std::uint8_t> outsideOf(const LabelImage& image, const std::vector<std::uint8_t>& air)
@@ -95,28 +179,46 @@ std::vector<Relabelled> relabel(LabelImage& image, const SkinLabels& labels, con
     return base::mapped<Relabelled>(taken, [](const auto& one) { return Relabelled{one.first, one.second, 0}; });
 }
 
-// The tissue that has a face to the outside: 1 where it is no skin, 2 where it is; and the area of the skin [m^2].
-double findSurface(const LabelImage& image, const SkinLabels& labels, const std::vector<std::uint8_t>& outside,
-                   LabelImage& surface)
+// The tissue that has a face to the outside: 1 where it is no skin, 2 where it is.
+LabelImage surfaceOf(const LabelImage& image, const SkinLabels& labels, const std::vector<std::uint8_t>& outside)
 {
-    const Vec3 s = image.affine.spacing();
-    const Vec3 area(s.y * s.z, s.x * s.z, s.x * s.y);
-    double skin = 0;
+    LabelImage surface{image.size, image.affine, std::vector<std::uint16_t>(countOf(image), 0)};
+    forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
+        const std::uint16_t value = image.values[image.offset(n)];
+        const bool open = labels.air[value] == 0 && std::ranges::any_of(faces, [&](Index3 face) {
+                              return base::holds(image.size, n + face) && outside[image.offset(n + face)] != 0;
+                          });
+        surface.values[image.offset(n)] = !open ? 0 : labels.isSkin[value] != 0 ? 2 : 1;
+    });
+    return surface;
+}
+
+// The mean of `distance`, to the outside, over the skin's innermost voxels: those with a face to other tissue that is
+// deeper [m]. 0 where there are none. A voxel next to the outside is a voxel's edge away from it: its own thickness.
+double meanThickness(const LabelImage& image, const SkinLabels& labels, const std::vector<float>& distance)
+{
+    double sum = 0;
+    std::uint64_t innermost = 0;
     forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
         const std::size_t at = image.offset(n);
-        if (labels.air[image.values[at]] != 0) {
+        if (labels.isSkin[image.values[at]] == 0 || !std::isfinite(distance[at])) {
             return;
         }
-        const bool isSkin = labels.isSkin[image.values[at]] != 0;
-        for (std::size_t f = 0; f < faces.size(); ++f) {
-            const Index3 next = n + faces[f];
-            if (base::holds(image.size, next) && outside[image.offset(next)] != 0) {
-                surface.values[at] = isSkin ? 2 : 1;
-                skin += isSkin ? area[static_cast<int>(f / 2)] : 0.0;
-            }
-        }
+        const bool onTissue = std::ranges::any_of(faces, [&](Index3 face) {
+            const std::size_t next = base::holds(image.size, n + face) ? image.offset(n + face) : at;
+            const std::uint16_t value = image.values[next];
+            return labels.air[value] == 0 && labels.isSkin[value] == 0 && distance[next] > distance[at];
+        });
+        sum += onTissue ? std::sqrt(static_cast<double>(distance[at])) : 0.0;
+        innermost += onTissue ? 1 : 0;
     });
-    return skin;
+    return innermost > 0 ? sum / static_cast<double>(innermost) : 0.0;
+}
+
+// Squared, and a little more, so that rounding decides nothing.
+float reachSquared(double reach)
+{
+    return static_cast<float>(reach * reach * (1 + 1e-5));
 }
 
 // Grows patches by edges and corners too: two voxels of a slanted hole often have no face in common.
@@ -170,26 +272,20 @@ std::vector<Relabelled> keepLargestPieces(LabelImage& image, const std::vector<s
             at->second = i;
         }
     }
-    const auto dropped = [&](std::uint32_t run) { return largest.at(pieces.runs()[run].group) != pieces.root(run); };
-    std::map<std::uint32_t, std::map<std::uint16_t, std::uint64_t>> around;  // root, label of a face, faces
-    forEachRun(pieces, image.size, [&](std::uint32_t i, int y, int z) {
-        if (dropped(i)) {
-            addFaces(image, pieces.runs()[i], y, z, around[pieces.root(i)]);
-        }
-    });
+    std::vector<char> loose(voxels.size(), 0);
     std::map<std::uint16_t, Relabelled> report;
-    std::map<std::uint32_t, std::uint16_t> newLabel;
-    for (const auto& [root, seen] : around) {
-        const auto most =
-            std::max_element(seen.begin(), seen.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-        newLabel[root] = most != seen.end() ? most->first : std::uint16_t{0};
-        const std::uint16_t value = pieces.runs()[root].group;
-        Relabelled& line = report.emplace(value, Relabelled{value, 0, 0}).first->second;
-        line.voxels += voxels[root];
-        line.pieces += 1;
+    for (std::uint32_t i = 0; i < voxels.size(); ++i) {
+        const std::uint16_t value = pieces.runs()[i].group;
+        if (pieces.root(i) == i && largest.at(value) != i) {
+            loose[i] = 1;
+            Relabelled& line = report.emplace(value, Relabelled{value, 0, 0}).first->second;
+            line.voxels += voxels[i];
+            line.pieces += 1;
+        }
     }
+    const std::map<std::uint32_t, std::uint16_t> newLabel = LoosePieces(image, pieces, loose).resolve();
     forEachRun(pieces, image.size, [&](std::uint32_t i, int y, int z) {
-        if (dropped(i)) {
+        if (loose[pieces.root(i)] != 0) {
             const RowRun& run = pieces.runs()[i];
             const auto at = image.values.begin() + static_cast<std::ptrdiff_t>(image.offset({run.first, y, z}));
             std::fill_n(at, run.last - run.first + 1, newLabel.at(pieces.root(i)));
@@ -198,26 +294,28 @@ std::vector<Relabelled> keepLargestPieces(LabelImage& image, const std::vector<s
     return base::mapped<Relabelled>(report, [](const auto& entry) { return entry.second; });
 }
 
-std::vector<Relabelled> addSkin(LabelImage& image, const SkinLabels& labels, double thickness)
+AddedSkin addSkin(LabelImage& image, const SkinLabels& labels, double thickness)
 {
     const std::vector<std::uint8_t> outside = outsideOf(image, labels.air);
-    const std::vector<float> distance = squaredDistance({image.size, image.affine}, outside, thickness);
-    const auto most = static_cast<float>(thickness * thickness * (1 + 1e-5));
-    return relabel(image, labels, [&](std::size_t i) { return distance[i] <= most; });
+    const Vec3 spacing = image.affine.spacing();
+    const double reach = std::max({thickness, spacing.x, spacing.y, spacing.z});
+    const std::vector<float> distance = squaredDistance({image.size, image.affine}, outside, reach);
+    const LabelImage surface = surfaceOf(image, labels, outside);
+    const float most = reachSquared(thickness);
+    AddedSkin out;
+    out.taken = relabel(image, labels, [&](std::size_t i) { return distance[i] <= most || surface.values[i] != 0; });
+    out.thickness = meanThickness(image, labels, distance);
+    return out;
 }
 
 ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double across)
 {
     const std::vector<std::uint8_t> outside = outsideOf(image, labels.air);
-    LabelImage surface{image.size, image.affine, std::vector<std::uint16_t>(countOf(image), 0)};
-    const double area = findSurface(image, labels, outside, surface);
-    const auto skin = static_cast<double>(
-        std::count_if(image.values.begin(), image.values.end(), [&](std::uint16_t v) { return labels.isSkin[v] != 0; }));
+    LabelImage surface = surfaceOf(image, labels, outside);
+    std::vector<std::uint8_t> others(countOf(image), 0), holes(countOf(image), 0);
+    std::transform(surface.values.begin(), surface.values.end(), others.begin(),
+                   [](std::uint16_t s) { return static_cast<std::uint8_t>(s == 2 ? 1 : 0); });
     ClosedHoles out;
-    const Vec3 spacing = image.affine.spacing();
-    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
-    out.thickness = std::max(voxel, area > 0 ? skin * image.affine.voxelVolume() / area : 0.0);
-    std::vector<std::uint8_t> holes(countOf(image), 0);
     PatchFinder finder(surface);
     forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
         if (surface.values[surface.offset(n)] != 1) {
@@ -229,16 +327,26 @@ ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double a
         out.closed += closes ? 1 : 0;
         out.left += closes ? 0 : 1;
         out.largestLeft = closes ? out.largestLeft : std::max(out.largestLeft, size);
-        for (const std::size_t at : closes ? patch : std::vector<std::size_t>{}) {
-            holes[at] = 1;
+        for (const std::size_t at : patch) {
+            (closes ? holes : others)[at] = 1;
         }
     });
+    const VoxelGrid grid{image.size, image.affine};
+    const Vec3 spacing = image.affine.spacing();
+    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
+    std::vector<float> depth = squaredDistance(grid, outside, std::numeric_limits<double>::infinity());
+    out.thickness = std::max(voxel, meanThickness(image, labels, depth));
     if (out.closed > 0) {
-        // From the hole's own voxels inwards, less the voxel that they are themselves.
-        const double depth = std::max(0.0, out.thickness - voxel);
-        const std::vector<float> distance = squaredDistance({image.size, image.affine}, holes, depth);
-        const auto most = static_cast<float>(depth * depth * (1 + 1e-5));
-        out.taken = relabel(image, labels, [&](std::size_t i) { return distance[i] <= most; });
+        const double deepest = out.thickness + 0.5 * voxel;
+        const float most = reachSquared(deepest);
+        std::vector<std::uint8_t> wanted(countOf(image));
+        std::transform(depth.begin(), depth.end(), wanted.begin(),
+                       [&](float d) { return static_cast<std::uint8_t>(d <= most ? 1 : 0); });
+        depth = squaredDistance(grid, holes, deepest);
+        const std::vector<float> beside = squaredDistance(grid, others, deepest);
+        out.taken = relabel(image, labels, [&](std::size_t i) {
+            return holes[i] != 0 || (wanted[i] != 0 && depth[i] <= most && depth[i] <= beside[i]);
+        });
     }
     return out;
 }

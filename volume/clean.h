@@ -16,7 +16,8 @@ struct Relabelled {
 
 /// Keeps the largest piece (joined by faces) of every label that is marked in `wanted` (65536 x 1); of pieces of one size
 /// the first in memory. Each other piece gets the label that most of the faces around it have (of labels that have as
-/// many: the smallest value), as the map was before.
+/// many: the smallest value); a piece around it that is itself loose counts with the label that it gets. Every marked label
+/// is one piece then.
 std::vector<Relabelled> keepLargestPieces(LabelImage& image, const std::vector<std::uint8_t>& wanted);
 
 /// What the skin's steps need to know of labels (65536 x 1 each).
@@ -31,17 +32,25 @@ struct ClosedHoles {
     std::uint64_t closed = 0;       // holes
     std::uint64_t left = 0;         // holes that are larger
     double largestLeft = 0;         // across [m]
-    double thickness = 0;           // that the holes were closed with [m]
+    double thickness = 0;           // of the skin on the mean, and of what closes the holes [m]
 };
 
 /// Closes holes in the skin: patches of other tissue that have a face to the outside. Those no larger than `across` [m]
-/// (diagonal of the box around them) become skin, as deep as the skin is thick on the mean (its volume by its area), one
-/// voxel at least. The outside is the air that reaches the border of the volume; the border itself is a cut, no surface.
+/// (diagonal of the box around them) and what lies under them become skin, as deep as the skin is thick on the mean (the
+/// distance of its innermost voxels to the outside, to the nearest layer of voxels), one voxel at least. The outside is the
+/// air that reaches the border of the volume; the border itself is a cut, no surface.
 ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double across);
 
+/// What addSkin() did.
+struct AddedSkin {
+    std::vector<Relabelled> taken;  // from which tissue
+    double thickness = 0;           // of all skin on the mean [m]; 0 where no other tissue is under it
+};
+
 /// Makes the outermost `thickness` [m] of tissue skin: every voxel of tissue whose centre is no further than that from the
-/// centre of an outside voxel. The body keeps its size.
-std::vector<Relabelled> addSkin(LabelImage& image, const SkinLabels& labels, double thickness);
+/// centre of an outside voxel, and every one with a face to the outside. So it is as many whole voxels thick as
+/// `thickness` holds, one at least. The body keeps its size.
+AddedSkin addSkin(LabelImage& image, const SkinLabels& labels, double thickness);
 
 /// The voxels from `low` to `high`, both included.
 LabelImage cropped(const LabelImage& image, Index3 low, Index3 high);

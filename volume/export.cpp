@@ -214,6 +214,12 @@ void writeSlices(OutputFile& out, const VoxelStream& voxels, bool planar, const 
     }
 }
 
+bool isNifti(const std::filesystem::path& file)
+{
+    const std::string name = lowerCase(file.filename().string());
+    return ends(name, ".nii") || ends(name, ".nii.gz");
+}
+
 void checkExportName(const std::filesystem::path& file)
 {
     static constexpr std::array<std::string_view, 5> endings{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"};

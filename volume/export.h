@@ -21,6 +21,9 @@ struct ExportOptions {
 /// std::runtime_error that lists them.
 void checkExportName(const std::filesystem::path& file);
 
+/// Whether `file` ends as NIfTI: .nii or .nii.gz.
+bool isNifti(const std::filesystem::path& file);
+
 /// The file beside `file` that holds the voxels: the .raw of an .mhd. Empty for the other formats.
 std::filesystem::path exportedDataOf(const std::filesystem::path& file);
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,10 @@ struct ImportOptions {
     /// "smallest", "last", "first". Segments that are not named lose against those that are. Empty: "smallest", the segment
     /// with the fewest voxels wins (the later one where they have the same number), so that no structure is swallowed.
     std::vector<std::string> overlap;
-    float fractionalThreshold = 0.5F;  // a probability from which a voxel is taken as set (DICOM SEG of type FRACTIONAL)
-    std::string series;                // SeriesInstanceUID to take where a folder holds several
+    /// A probability from which a voxel is taken as set (DICOM SEG of type FRACTIONAL); none: 0.5. Labels without
+    /// probabilities are refused with one.
+    std::optional<float> fractionalThreshold;
+    std::string series;  // SeriesInstanceUID to take where a folder holds several
     /// Grids whose voxel axes are not at right angles (tilted gantry, affine registration) are refused unless the caller
     /// resamples them. Images are read in any case.
     bool sheared = false;

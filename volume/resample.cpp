@@ -10,17 +10,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 namespace palpate::volume {
 
 namespace {
 
-constexpr int blockSide = 8;       // new voxels that are looked at together
-constexpr int maxSamples = 8;      // along an axis of a new voxel
-constexpr double equal = 1e-9;     // shares that differ by less are the same
-constexpr double maxLoss = 0.1;    // of a structure's volume before it gets voxels back
-constexpr float minShare = 1e-4F;  // of a voxel that a structure can get back
+constexpr int blockSide = 8;        // new voxels that are looked at together
+constexpr double equal = 1e-9;      // shares that differ by less are the same
+constexpr double maxLoss = 0.1;     // of a structure's volume before it gets voxels back
+constexpr double minShare = 1e-10;  // of a voxel that a structure can get back: more than rounding leaves
+constexpr double maxSlant = 0.01;   // of the old axes in the new ones [old voxels]: those are parallel
 
 // The orthogonal matrix nearest to `m` (N. Higham, "Computing the Polar Decomposition", 1986); a mirrored one stays so.
 Mat3 nearestOrthogonal(Mat3 m)
@@ -52,17 +53,22 @@ public:
         const Vec3 spacing = grid.affine.spacing();
         step_ = toIndex * grid.affine.linear;
         start_ = toIndex * (grid.affine.origin - image.affine.origin);
-        Index3 samples(1);
+        Vec3 square(0.0);  // of the old voxels that a sample reaches over, along each old axis
+        double across = 0;
         for (int k = 0; k < 3; ++k) {
-            const double widest = std::max({std::abs(step_[k].x), std::abs(step_[k].y), std::abs(step_[k].z)});
-            samples[k] = std::clamp(static_cast<int>(std::ceil(widest - 1e-6)), 1, maxSamples);
-            interpolate_[k] = old[k] > 0.499 * std::min({spacing.x, spacing.y, spacing.z});
+            const Vec3 along = glm::abs(step_[k]);
+            samples_[k] = std::max(1, static_cast<int>(std::ceil(std::max({along.x, along.y, along.z}) - 1e-6)));
+            const Vec3 part = step_[k] / static_cast<double>(samples_[k]);
+            square += part * part;
+            reach_ += 0.5 * along;
+            across = std::max(across, along.x + along.y + along.z - along[k]);
         }
-        forEachIndex(Index3(0), samples - 1,
-                     [&](Index3 n) { offsets_.push_back(step_ * ((Vec3(n) + 0.5) / Vec3(samples) - 0.5)); });
-        for (const Vec3& offset : offsets_) {
-            reach_ = glm::max(reach_, glm::abs(offset) + 1.0);
+        for (int axis = 0; axis < 3; ++axis) {
+            const bool interpolated = old[axis] > 0.499 * std::min({spacing.x, spacing.y, spacing.z});
+            width_[axis] = interpolated ? 1.0 : std::min(1.0, std::sqrt(square[axis]));
         }
+        rim_ = across < maxSlant ? Index3(glm::ceil(reach_)) : Index3(0);
+        reach_ += 1.0;
     }
 
     // The one label that all of the new voxels from `low` to `high` are made of, or -1.
@@ -76,9 +82,11 @@ public:
             last = glm::max(last, start_ + step_ * n);
         }
         const Index3 size = image_.size;
-        const Index3 from(glm::floor(glm::max(first - reach_, Vec3(-2.0))));
-        const Index3 to(glm::ceil(glm::min(last + reach_, Vec3(size) + 2.0)));
-        const bool beyond = glm::any(glm::lessThan(from, Index3(0))) || glm::any(glm::greaterThanEqual(to, size));
+        // No whole number can be made of a place that is far away.
+        const Index3 far = rim_ + 2;
+        const Index3 from(glm::floor(glm::max(first - reach_, -Vec3(far))));
+        const Index3 to(glm::ceil(glm::min(last + reach_, Vec3(size + far))));
+        const bool beyond = glm::any(glm::lessThan(from, -rim_)) || glm::any(glm::greaterThanEqual(to, size + rim_));
         const Index3 a = glm::clamp(from, Index3(0), size - 1);
         const Index3 b = glm::clamp(to, Index3(0), size - 1);
         const std::uint16_t value = beyond ? std::uint16_t{0} : image_.values[image_.offset(a)];
@@ -93,24 +101,14 @@ public:
         return value;
     }
 
-    // The shares of the labels in new voxel `n`; what is beyond the image counts as label 0. They add up to 1.
+    // The shares of the labels in new voxel `n`. They add up to 1.
     void fractions(Index3 n, std::vector<Share>& out) const
     {
         out.clear();
         const Vec3 centre = start_ + step_ * Vec3(n);
-        const double part = 1.0 / static_cast<double>(offsets_.size());
-        for (const Vec3& offset : offsets_) {
-            const Vec3 at = centre + offset;
-            const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
-            const Vec3 t = (at - low) * Vec3(interpolate_);
-            for (int corner = 0; corner < 8; ++corner) {
-                const Index3 step(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
-                const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
-                if (const double weight = w.x * w.y * w.z; weight > 0) {
-                    add(out, Index3(low) + step, part * weight);
-                }
-            }
-        }
+        const double part = 1.0 / static_cast<double>(base::countOf(samples_));
+        forEachIndex(Index3(0), samples_ - 1,
+                     [&](Index3 s) { addSample(out, centre + step_ * ((Vec3(s) + 0.5) / Vec3(samples_) - 0.5), part); });
     }
 
     std::uint16_t winner(const std::vector<Share>& fractions) const
@@ -126,10 +124,26 @@ public:
     }
 
 private:
+    // A sample is a box around `at` of `width_`, no wider than an old voxel: it lies in two of them along each axis.
+    void addSample(std::vector<Share>& out, Vec3 at, double part) const
+    {
+        const Vec3 low = glm::floor(at);
+        const Vec3 t = glm::clamp((at - low - 0.5) / width_ + 0.5, 0.0, 1.0);
+        for (int corner = 0; corner < 8; ++corner) {
+            const Index3 step(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+            const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
+            if (const double weight = w.x * w.y * w.z; weight > 0) {
+                add(out, Index3(low) + step, part * weight);
+            }
+        }
+    }
+
+    // New voxels that the image's border cuts go on as they are inside; what is further out is label 0.
     void add(std::vector<Share>& out, Index3 n, double weight) const
     {
-        const bool inside = glm::all(glm::greaterThanEqual(n, Index3(0))) && glm::all(glm::lessThan(n, image_.size));
-        const std::uint16_t label = inside ? image_.values[image_.offset(n)] : std::uint16_t{0};
+        const Index3 nearest = glm::clamp(n, Index3(0), image_.size - 1);
+        const bool inside = glm::all(glm::lessThanEqual(glm::abs(n - nearest), rim_));
+        const std::uint16_t label = inside ? image_.values[image_.offset(nearest)] : std::uint16_t{0};
         for (Share& s : out) {
             if (s.label == label) {
                 s.weight += weight;
@@ -141,11 +155,12 @@ private:
 
     const LabelImage& image_;
     std::span<const std::uint64_t> voxels_;  // of each label in the old image (65536 x 1)
-    std::vector<Vec3> offsets_;              // samples of a new voxel [old voxels from its centre]
     Mat3 step_{1.0};                         // steps of new voxels [old voxels]
     Vec3 start_{0.0};                        // centre of new voxel (0, 0, 0) [old voxels]
+    Index3 samples_{1};                      // of a new voxel, along each of its axes
+    Vec3 width_{1.0};                        // of a sample [old voxels]
     Vec3 reach_{0.0};                        // of a new voxel's samples [old voxels]
-    glm::bvec3 interpolate_{false};
+    Index3 rim_{0};                          // old voxels that the image goes on by
 };
 
 // A voxel that a thin structure may get: it fills `fraction` of it.
@@ -165,7 +180,14 @@ struct Slab {
 class Resampling {
 public:
     Resampling(const LabelImage& image, const VoxelGrid& grid, const std::function<void(double)>& progress)
-        : image_(image), grid_(grid), progress_(progress), voxels_(65536, 0)
+        : image_(image),
+          grid_(grid),
+          progress_(progress),
+          voxels_(65536, 0),
+          won_(65536, 0),
+          got_(65536, 0),
+          isThin_(65536, 0),
+          beside_(65536, 0)
     {
         for (const std::uint16_t v : image.values) {
             ++voxels_[v];
@@ -177,18 +199,17 @@ public:
 
     ResampledLabels run()
     {
-        const Totals filled = fill();
-        std::vector<std::uint64_t> won(65536, 0);
+        filled_ = fill();
         for (const std::uint16_t v : out_.values) {
-            ++won[v];
+            ++won_[v];
         }
-        const std::vector<std::uint64_t> regained = giveBack(filled, won);
+        giveBack();
         ResampledLabels result;
         for (std::size_t v = 1; v < voxels_.size(); ++v) {
             if (voxels_[v] > 0) {
-                result.changes.push_back({static_cast<std::uint16_t>(v),
-                                          static_cast<double>(voxels_[v]) * image_.affine.voxelVolume(),
-                                          static_cast<double>(won[v]) * grid_.affine.voxelVolume(), regained[v]});
+                result.changes.push_back(
+                    {static_cast<std::uint16_t>(v), static_cast<double>(voxels_[v]) * image_.affine.voxelVolume(),
+                     static_cast<double>(won_[v]) * grid_.affine.voxelVolume(), got_[v], beside_[v] != 0});
             }
         }
         result.image = std::move(out_);
@@ -262,50 +283,90 @@ private:
         return filled;
     }
 
-    // The rule for thin structures. `won` (voxels of each label) is kept up to date; returns what each label got.
-    std::vector<std::uint64_t> giveBack(const Totals& filled, std::vector<std::uint64_t>& won)
+    // The rule for thin structures.
+    void giveBack()
     {
-        std::vector<std::uint64_t> got(65536, 0);
         std::vector<std::uint16_t> thin;
-        std::vector<char> isThin(65536, 0);
         for (std::size_t v = 1; v < voxels_.size(); ++v) {
-            if (voxels_[v] > 0 && filled[v] > 0 && static_cast<double>(won[v]) < (1 - maxLoss) * filled[v]) {
+            if (voxels_[v] > 0 && filled_[v] > 0 && static_cast<double>(won_[v]) < (1 - maxLoss) * filled_[v]) {
                 thin.push_back(static_cast<std::uint16_t>(v));
-                isThin[v] = 1;
+                isThin_[v] = 1;
             }
         }
         if (thin.empty()) {
-            return got;
+            return;
         }
-        std::vector<std::vector<Claim>> claims = claimsOf(isThin);
-        std::stable_sort(thin.begin(), thin.end(), [&](std::uint16_t a, std::uint16_t b) { return filled[a] < filled[b]; });
+        const std::vector<std::vector<Claim>> claims = claimsOf();
+        std::stable_sort(thin.begin(), thin.end(),
+                         [&](std::uint16_t a, std::uint16_t b) { return filled_[a] < filled_[b]; });
         for (const std::uint16_t label : thin) {
-            const auto wanted = static_cast<std::uint64_t>(std::max(1.0, std::round(filled[label])));
+            const auto wanted = static_cast<std::uint64_t>(std::max(1.0, std::round(filled_[label])));
             for (const Claim& claim : claims[label]) {
-                if (won[label] >= wanted) {
+                if (won_[label] >= wanted) {
                     break;
                 }
-                std::uint16_t& voxel = out_.values[claim.voxel];
-                const bool spare = isThin[voxel] == 0 || (won[label] == 0 && won[voxel] > 1);
-                if (spare) {
-                    --won[voxel];
-                    ++won[label];
-                    ++got[label];
-                    voxel = label;
+                if (isSpare(out_.values[claim.voxel], label)) {
+                    give(claim.voxel, label);
                 }
             }
         }
-        return got;
+        for (const std::uint16_t label : thin) {
+            if (won_[label] == 0 && !claims[label].empty()) {
+                giveBeside(claims[label].front().voxel, label);
+            }
+        }
+    }
+
+    // Whether `owner` can do without a voxel for `taker`: it keeps one, and nine tenths of its volume, unless `taker` has
+    // none.
+    bool isSpare(std::uint16_t owner, std::uint16_t taker) const
+    {
+        const bool enough = isThin_[owner] == 0 && static_cast<double>(won_[owner] - 1) >= (1 - maxLoss) * filled_[owner];
+        return owner == 0 || (won_[owner] > 1 && (enough || won_[taker] == 0));
+    }
+
+    void give(std::size_t voxel, std::uint16_t label)
+    {
+        --won_[out_.values[voxel]];
+        ++won_[label];
+        ++got_[label];
+        out_.values[voxel] = label;
+    }
+
+    // All voxels that `label` is in are the only ones of their structures: it gets one around that which it fills most of,
+    // of tissue if there is some, as near as there is one, and of the structure with most voxels.
+    void giveBeside(std::size_t voxel, std::uint16_t label)
+    {
+        const Index3 middle = base::cellOf(out_.size, voxel);
+        std::size_t best = voxel;
+        std::tuple<int, int, std::uint64_t> bestRank{2, 0, 0};
+        forEachIndex(Index3(-1), Index3(1), [&](Index3 step) {
+            const Index3 n = middle + step;
+            if (!base::holds(out_.size, n) || won_[out_.values[out_.offset(n)]] < 2) {
+                return;
+            }
+            const std::uint16_t owner = out_.values[out_.offset(n)];
+            const Index3 square = step * step;
+            const std::tuple rank(owner == 0 ? 1 : 0, square.x + square.y + square.z, ~won_[owner]);
+            if (rank < bestRank) {
+                bestRank = rank;
+                best = out_.offset(n);
+            }
+        });
+        if (best != voxel) {
+            give(best, label);
+            beside_[label] = 1;
+        }
     }
 
     // By label: voxels that it has a fraction of but not won, those that it fills most of first.
-    std::vector<std::vector<Claim>> claimsOf(const std::vector<char>& isThin)
+    std::vector<std::vector<Claim>> claimsOf()
     {
         const auto slabs = sweep(
             0.8, 1,
             [&](std::size_t voxel, const std::vector<Share>& fractions, const Sampler&, Slab& slab) {
                 for (const Share& s : fractions) {
-                    if (isThin[s.label] == 0 || out_.values[voxel] == s.label || s.weight < minShare) {
+                    if (isThin_[s.label] == 0 || out_.values[voxel] == s.label || s.weight < minShare) {
                         continue;
                     }
                     auto at = std::find_if(slab.claims.begin(), slab.claims.end(),
@@ -334,8 +395,14 @@ private:
     const LabelImage& image_;
     const VoxelGrid& grid_;
     const std::function<void(double)>& progress_;
-    std::vector<std::uint64_t> voxels_;  // of each label in the old image (65536 x 1)
     LabelImage out_;
+    // Of each label (65536 x 1):
+    std::vector<std::uint64_t> voxels_;  // in the old image
+    Totals filled_;                      // new voxels that it fills
+    std::vector<std::uint64_t> won_;     // new voxels that it has
+    std::vector<std::uint64_t> got_;     // of these, by the rule for thin structures
+    std::vector<char> isThin_;
+    std::vector<char> beside_;  // it has a voxel that it fills nothing of
 };
 
 }  // namespace

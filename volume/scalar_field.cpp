@@ -99,15 +99,49 @@ Vec3 DistanceField::normal(Vec3 p) const noexcept
 
 namespace {
 
+// The parabolas of the lower envelope on a line, by place along it.
+struct Envelope {
+    std::vector<int> vertex;    // where it is lowest [steps]
+    std::vector<double> start;  // from where on it is the lowest of all [steps]
+
+    // Adds that with its vertex at `k`, which is behind all others; `height` by vertex, in squares of steps.
+    template <typename Height>
+    void add(int k, const Height& height)
+    {
+        double from = std::numeric_limits<double>::lowest();
+        while (!vertex.empty()) {
+            const double p = vertex.back(), q = k;
+            from = (height(k) + q * q - height(vertex.back()) - p * p) / (2.0 * (q - p));
+            if (from > start.back()) {
+                break;
+            }
+            vertex.pop_back();
+            start.pop_back();
+            from = std::numeric_limits<double>::lowest();
+        }
+        vertex.push_back(k);
+        start.push_back(from);
+    }
+};
+
 // Values along one axis, and how to work on a line of them.
 struct LinePass {
     std::vector<float> square;  // of 0, 1, 2 .. steps [m^2]
+    double step = 0;            // [m]
     std::size_t stride = 1;
     int count = 0;
 
-    // Lowers each value to the least of those within the window plus the square of the way to them.
-    void run(float* first, std::vector<float>& line) const
+    // What a line needs.
+    struct Scratch {
+        std::vector<float> line;
+        Envelope envelope;
+    };
+
+    // Lowers each value to the least of those within the window plus the square of the way to them. Beyond the window it
+    // may stay as it was.
+    void run(float* first, Scratch& scratch) const
     {
+        std::vector<float>& line = scratch.line;
         line.resize(static_cast<std::size_t>(count));
         for (std::size_t k = 0; k < line.size(); ++k) {
             line[k] = first[k * stride];
@@ -115,7 +149,14 @@ struct LinePass {
         if (std::all_of(line.begin(), line.end(), [&](float v) { return v == line[0]; })) {
             return;
         }
+        constexpr int largestTried = 8;
         const int window = static_cast<int>(square.size()) - 1;
+        window <= largestTried ? tryAll(first, line, window) : follow(first, line, scratch.envelope, window);
+    }
+
+private:
+    void tryAll(float* first, const std::vector<float>& line, int window) const
+    {
         for (int k = 0; k < count; ++k) {
             float least = std::numeric_limits<float>::infinity();
             for (int j = std::max(0, k - window); j <= std::min(count - 1, k + window); ++j) {
@@ -123,6 +164,28 @@ struct LinePass {
                     std::min(least, line[static_cast<std::size_t>(j)] + square[static_cast<std::size_t>(std::abs(j - k))]);
             }
             first[static_cast<std::size_t>(k) * stride] = least;
+        }
+    }
+
+    void follow(float* first, const std::vector<float>& line, Envelope& envelope, int window) const
+    {
+        envelope.vertex.clear();
+        envelope.start.clear();
+        const auto height = [&](int k) { return static_cast<double>(line[static_cast<std::size_t>(k)]) / (step * step); };
+        for (int k = 0; k < count; ++k) {
+            if (std::isfinite(line[static_cast<std::size_t>(k)])) {
+                envelope.add(k, height);
+            }
+        }
+        std::size_t at = 0;
+        for (int k = 0; k < count; ++k) {
+            while (at + 1 < envelope.vertex.size() && envelope.start[at + 1] <= k) {
+                ++at;
+            }
+            const int vertex = envelope.vertex[at], away = std::abs(vertex - k);
+            first[static_cast<std::size_t>(k) * stride] =
+                away <= window ? line[static_cast<std::size_t>(vertex)] + square[static_cast<std::size_t>(away)]
+                               : std::numeric_limits<float>::infinity();
         }
     }
 };
@@ -139,18 +202,18 @@ std::vector<float> squaredDistance(const VoxelGrid& grid, const std::vector<std:
     for (int axis = 0; axis < 3; ++axis) {
         Index3 step(0);
         step[axis] = 1;
-        LinePass pass{{}, places.offset(step), grid.size[axis]};
-        for (int k = 0; k * spacing[axis] <= reach * (1 + 1e-6); ++k) {
+        LinePass pass{{}, spacing[axis], places.offset(step), grid.size[axis]};
+        for (int k = 0; k < grid.size[axis] && k * spacing[axis] <= reach * (1 + 1e-6); ++k) {
             pass.square.push_back(static_cast<float>(k * k * spacing[axis] * spacing[axis]));
         }
         const int outer = axis == 2 ? 1 : 2, inner = axis == 0 ? 1 : 0;
         tbb::parallel_for(0, grid.size[outer], [&](int o) {
-            std::vector<float> line;
+            LinePass::Scratch scratch;
             for (int i = 0; i < grid.size[inner]; ++i) {
                 Index3 start(0);
                 start[outer] = o;
                 start[inner] = i;
-                pass.run(d.data() + places.offset(start), line);
+                pass.run(d.data() + places.offset(start), scratch);
             }
         });
     }

@@ -305,7 +305,10 @@ std::string reasonOf(const std::exception& e)
     if (dynamic_cast<const std::ios_base::failure*>(&e) != nullptr) {
         return "is cut short or damaged: make it again";
     }
-    if (dynamic_cast<const json::exception*>(&e) != nullptr || dynamic_cast<const openvdb::Exception*>(&e) != nullptr) {
+    if (dynamic_cast<const json::exception*>(&e) != nullptr) {
+        return "is damaged (what it says of itself cannot be read): make it again";  // what() quotes bytes of any kind
+    }
+    if (dynamic_cast<const openvdb::Exception*>(&e) != nullptr) {
         return fmt::format("is damaged ({}): make it again", e.what());
     }
     return e.what();

@@ -163,7 +163,7 @@ TEST(CommandLine, AFileThatIsReadIsNotReplacedByWhatIsWritten)
     const std::string path = folder / "p.csv", volume = folder / "v.vdb", labels = folder / "l.nii.gz";
     const std::string record = folder / "s.db", profiles = folder / "profiles.db";
     writeText(path, "seconds,x_mm,y_mm,z_mm\n0,0,-12,0\n0.1,0,-12,0\n");
-    ASSERT_EQ(palpate({"phantom", "layered", "--voxel", "4", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"phantom", "layered", "--voxel", "3", "-o", volume}).status, 0);
     ASSERT_EQ(palpate({"export", volume, "-o", labels}).status, 0);
     ASSERT_EQ(palpate({"train", smallLayered(), "--headless", "--unpaced", "--setting", "fast", "--seconds", "0.1",
                        "--record", record})

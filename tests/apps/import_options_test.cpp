@@ -198,6 +198,7 @@ TEST_F(ImportOptions, ABoxFarAwayHoldsNothing)
 TEST_F(ImportOptions, WhatIsOnlyOfDicomDoesNotPassInSilence)
 {
     refused(one, with({"--series", "1.2.3"}), "leave --series out");
+    refused(one, with({"--threshold", "0.3"}), "it is no fractional DICOM SEG");
     EXPECT_TRUE(warns(taken(one, with({"--dicom-labels"})), "--dicom-labels decides nothing"));
     expectRefusal(import(one, with({"--threshold", "1.5"})), "--threshold: Value 1.5 not in range");
     EXPECT_TRUE(warns(taken(one, with({"--overlap", "first"})), "--overlap decides nothing"));
@@ -220,6 +221,7 @@ TEST_F(ImportOptions, WhatIsOnlyOfDicomDoesNotPassInSilence)
         return voxels(taken(file, more));
     };
     EXPECT_NE(by(seg, {"--overlap", "first"}), by(seg, {"--overlap", "last"}));
+    refused(seg, {"--threshold", "0.3", "--default-tissue", "fat"}, "leave --threshold out");
     refused(seg, {"--overlap", "sideways", "--default-tissue", "fat"}, "sideways");
     EXPECT_GT(by(fraction, {"--threshold", "0.1"}).at(1), by(fraction, {"--threshold", "0.5"}).at(1));
     refused(fraction, {"--threshold", "0.6", "--default-tissue", "fat"}, "no voxel is set in any of its segments");

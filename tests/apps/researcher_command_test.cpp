@@ -291,6 +291,7 @@ TEST_F(Researcher, AnExportIsImportedAgainAsItWas)
         expectRefusal(words, more[1] + ": is for");
     }
     expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--height", "900"}, "--height: is for");
+    expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--nifti2"}, "--nifti2: is for .nii and .nii.gz");
     expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--what", "image"}, "holds no image");
 }
 

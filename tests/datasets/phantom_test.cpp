@@ -377,6 +377,27 @@ TEST(Phantom, EveryParameterIsCheckedAgainstItsRange)
     EXPECT_NE(errorOf(wide).find("finds no room"), std::string::npos) << errorOf(wide);
     EXPECT_NE(errorOf({.name = "knee"}).find("breast, layered, block"), std::string::npos);
     EXPECT_NE(errorOf({.name = "block", .numbers = {{"depth", 1.0}}}).find("no such parameter 'depth'"), std::string::npos);
+    EXPECT_EQ(errorOf({.name = "block", .words = {{"width_mm", "abc"}}}), "phantom 'block': width_mm: must be a number");
+    EXPECT_EQ(errorOf({.name = "block", .numbers = {{"tissue", 3.0}}}),
+              "phantom 'block': tissue: must be a name, as \"fat\" is");
+}
+
+// Layers are where the centres of voxels are: one that has none would be missing without a word.
+TEST(Phantom, APartThatNoVoxelHoldsIsRefused)
+{
+    const std::pair<PhantomSpec, std::string> lost[] = {
+        {{.name = "layered", .voxel = 5e-3}, "skin_mm = 2 mm: no voxel of 5 mm"},
+        {{.name = "layered", .voxel = 4e-3, .numbers = {{"skin_mm", 1.5}}}, "skin_mm = 1.5 mm: no voxel of 4 mm"},
+        {{.name = "layered", .voxel = 2e-3, .numbers = {{"skin_mm", 0.5}}}, "skin_mm = 0.5 mm: no voxel of 2 mm"},
+        {{.name = "layered", .voxel = 3e-3, .numbers = {{"fat_mm", 0.1}}}, "fat_mm = 0.1 mm: no voxel of 3 mm"},
+        {{.name = "block", .voxel = 5e-3, .numbers = {{"base_mm", 1}}}, "base_mm = 1 mm: no voxel of 5 mm"},
+        {{.name = "block", .voxel = 5e-3, .numbers = {{"tumour_diameter_mm", 2}, {"tumour_centre_mm", 20}}},
+         "tumour_diameter_mm = 2 mm: no voxel of 5 mm"}};
+    for (const auto& [spec, words] : lost) {
+        EXPECT_NE(errorOf(spec).find(words), std::string::npos) << errorOf(spec);
+    }
+    const PhantomSpec none{.name = "layered", .voxel = 2e-3, .numbers = {{"fat_mm", 0}, {"tumours", 0}}};
+    EXPECT_EQ(errorOf(none), "no error") << "what has no size needs no voxel";
 }
 
 }  // namespace

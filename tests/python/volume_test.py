@@ -107,9 +107,15 @@ class FromNumpy(InFolder):
             with self.subTest(origin), self.assertRaises(ValueError):
                 palpate.Volume.from_numpy(cube(), placed(AFFINE, origin), TISSUES)
 
+    def test_a_unit_without_an_image_is_refused(self):
+        with self.assertRaisesRegex(ValueError, "image_unit: needs the image"):
+            palpate.Volume.from_numpy(cube(), AFFINE, TISSUES, image_unit="HU")
+
     def test_a_phantoms_parameter_without_a_number_is_named(self):
         with self.assertRaisesRegex(TypeError, "width_mm: give a number or a word, not None"):
             palpate.Volume.phantom("block", width_mm=None)
+        with self.assertRaisesRegex(palpate.Error, "width_mm: must be a number"):
+            palpate.Volume.phantom("block", width_mm="abc")
         self.assertEqual(palpate.Volume.phantom("block", voxel=4e-3, width_mm=np.float32(60)).shape,
                          palpate.Volume.phantom("block", voxel=4e-3, width_mm=60).shape)
 
@@ -175,6 +181,23 @@ class Files(InFolder):
         self.assertEqual(ours.info["labels"], theirs.info["labels"])
         np.testing.assert_allclose(ours.affine, AFFINE, atol=1e-9)
 
+    def test_what_is_added_beside_tissue_of_label_0_is_air(self):
+        labels = np.zeros((20, 20, 20), np.uint8)
+        labels[8:12, 8:12, 8:12] = 3
+        palpate.Volume.from_numpy(labels, AFFINE, {0: "fat", 3: "idc_high_grade"}).save(self.folder / "v.vdb")
+        program("export", self.folder / "v.vdb", "-o", self.folder / "v.nrrd")
+        program("import", self.folder / "v.nrrd", "--set", "0=fat", "--set", "3=idc_high_grade", "--pad", "6",
+                "-o", self.folder / "w.vdb")
+        padded = palpate.Volume.open(self.folder / "w.vdb")
+        self.assertEqual(padded.shape, (32, 26, 24))
+        inside = (slice(6, -6), slice(3, -3), slice(2, -2))
+        self.assertEqual(np.count_nonzero(padded.labels), labels.size)
+        np.testing.assert_array_equal(padded.labels[inside] == 3, labels == 3)
+        self.assertTrue((padded.labels[inside] != 0).all())
+        hull = palpate.Volume.import_(self.folder / "v.nrrd", body_from_hull=5e-3, set={"0": "fat", "3": "idc_high_grade"})
+        self.assertIn("invented_skin", [one["name"] for one in hull.info["labels"]])
+        self.assertEqual(hull.labels[0, 0, 0], 0)
+
     def test_lengths_out_of_bounds_are_refused(self):
         for wrong in ({"voxel": 1.0}, {"voxel": -1e-3}, {"voxel": np.nan}, {"body_from_hull": -5.0},
                       {"body_from_hull": np.nan}, {"body_from_hull": 1e-4}):
@@ -192,6 +215,15 @@ class Files(InFolder):
             else:
                 with self.assertRaisesRegex(palpate.Error, wrong):
                     palpate.Volume.import_(file, set={"1": "fat"})
+
+    def test_a_damaged_description_is_said_in_plain_text(self):
+        file = self.folder / "v.vdb"
+        palpate.Volume.from_numpy(cube(), AFFINE, TISSUES).save(file)
+        whole = file.read_bytes()
+        self.assertIn(b'"format":', whole)
+        file.write_bytes(whole.replace(b'"format":', b'"form\xff\xfe":'))
+        with self.assertRaisesRegex(palpate.Error, "v.vdb: is damaged"):
+            palpate.Volume.open(file)
 
     def test_errors_name_the_file(self):
         with self.assertRaisesRegex(palpate.Error, "nothing.vdb"):

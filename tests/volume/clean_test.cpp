@@ -117,6 +117,29 @@ TEST(LargestPiece, AgreesWithFloodingOnNoise)
     }
 }
 
+// A loose piece in a loose piece in air: both become air. What is one piece for each label has nothing loose any more.
+TEST(LargestPiece, NoLoosePieceComesOfAnother)
+{
+    LabelImage image = empty(Index3(40));
+    fill(image, {2, 2, 2}, {11, 11, 11}, 1);
+    fill(image, {2, 2, 14}, {11, 11, 23}, 2);
+    fill(image, {25, 25, 25}, {31, 31, 31}, 2);
+    fill(image, {27, 27, 27}, {29, 29, 29}, 1);
+    EXPECT_EQ(keepLargestPieces(image, marked({1, 2})).size(), 2U);
+    EXPECT_EQ(count(image, 1), 1000U);
+    EXPECT_EQ(count(image, 2), 1000U);
+
+    std::mt19937 random(8);
+    for (const unsigned labels : {2U, 3U, 5U}) {
+        LabelImage noise = empty({23, 19, 17});
+        for (auto& v : noise.values) {
+            v = static_cast<std::uint16_t>(1 + random() % labels);
+        }
+        keepLargestPieces(noise, marked({1, 2, 3, 4, 5}));
+        EXPECT_TRUE(keepLargestPieces(noise, marked({1, 2, 3, 4, 5})).empty()) << labels;
+    }
+}
+
 // A ball of radius R with a layer of thickness t. The outside voxel nearest to a place r from the middle is at least R - r
 // away, and less than a voxel's diagonal further.
 TEST(AddSkin, IsAsThickAsAskedForAtAnySpacing)
@@ -127,7 +150,7 @@ TEST(AddSkin, IsAsThickAsAskedForAtAnySpacing)
         const Affine affine = centred(oblique(spacing, Vec3(0.0), true), size);
         LabelImage image = voxelise(size, affine, [&](Vec3 p) { return glm::length(p) < radius ? 1 : 0; });
         const LabelImage before = image;
-        const auto taken = addSkin(image, skinIs(2), thickness);
+        const auto taken = addSkin(image, skinIs(2), thickness).taken;
         ASSERT_EQ(taken.size(), 1U);
         EXPECT_EQ(taken[0].voxels, count(image, 2));
         EXPECT_EQ(count(image, 1) + count(image, 2), count(before, 1));
@@ -140,6 +163,28 @@ TEST(AddSkin, IsAsThickAsAskedForAtAnySpacing)
             }
         });
     }
+}
+
+// As many whole voxels as the thickness holds, one at least, along each axis; and it says how thick that is.
+TEST(AddSkin, CoversEveryFaceOfCoarseVoxels)
+{
+    LabelImage image = empty({60, 60, 40});
+    image.affine.linear = Mat3(0.7e-3, 0, 0, 0, 0.7e-3, 0, 0, 0, 3e-3);
+    fill(image, {10, 10, 10}, {49, 49, 29}, 1);
+    addSkin(image, skinIs(2), 1.75e-3);
+    EXPECT_EQ(count(image, 1), 36U * 36U * 18U);
+
+    for (const auto& [asked, voxels] : {std::pair(0.3e-3, 1), {1.5e-3, 1}, {2e-3, 2}, {3.9e-3, 3}}) {
+        LabelImage cube = empty(Index3(40));
+        fill(cube, Index3(10), Index3(29), 1);
+        const AddedSkin added = addSkin(cube, skinIs(2), asked);
+        const auto inner = static_cast<std::uint64_t>(20 - 2 * voxels);
+        EXPECT_EQ(count(cube, 1), inner * inner * inner) << asked;
+        EXPECT_NEAR(added.thickness, 1e-3 * voxels, 1e-9) << asked;
+    }
+    LabelImage small = empty(Index3(9));
+    fill(small, Index3(3), Index3(5), 1);
+    EXPECT_EQ(addSkin(small, skinIs(2), 5e-3).thickness, 0.0) << "all of it is skin";
 }
 
 // Air inside, as in a lung, and the cut at the volume's border get no skin.
@@ -173,13 +218,44 @@ TEST(CloseSkinHoles, SmallHolesAreClosedAndLargeOnesReported)
     LabelImage both = image;
     EXPECT_EQ(closeSkinHoles(both, skinIs(2), 20e-3).left, 0U);
     forEachIndex(Index3(0), both.size - 1, [&](Index3 n) {
-        if (n.z == 4) {
+        if (n.z == 4 || n.z == 5) {
             EXPECT_EQ(both.values[both.offset(n)], whole.values[whole.offset(n)]);
         }
     });
     LabelImage again = whole;
     EXPECT_EQ(closeSkinHoles(again, skinIs(2), 20e-3).closed, 0U);
     EXPECT_EQ(again.values, whole.values);
+}
+
+// A hole of 6 mm in the skin of a ball, along an axis and along the diagonal of the voxels: it is filled as deep as the
+// skin, whose thickness is known, and hardly anything else.
+TEST(CloseSkinHoles, AreFilledAsDeepAsTheSkinIsThick)
+{
+    const Index3 size(110);
+    const Affine affine = centred({Mat3(1e-3), Vec3(0.0)}, size);
+    for (const Vec3 along : {Vec3(1, 0, 0), Vec3(1, 1, 1), Vec3(1, 2, 0)}) {
+        const Vec3 u = glm::normalize(along);
+        const auto inHole = [&](Vec3 p) { return glm::dot(p, u) > 0 && glm::length(p - glm::dot(p, u) * u) < 3e-3; };
+        for (const double thickness : {2e-3, 4e-3}) {
+            const auto body = [&](Vec3 p) {
+                const double depth = 50e-3 - glm::length(p);
+                return depth <= 0 ? 0 : depth <= thickness ? 2 : 1;
+            };
+            const LabelImage whole = voxelise(size, affine, body);
+            LabelImage image = voxelise(size, affine, [&](Vec3 p) { return body(p) == 2 && inHole(p) ? 1 : body(p); });
+            const auto hole = count(whole, 2) - count(image, 2);
+            const ClosedHoles report = closeSkinHoles(image, skinIs(2), 10e-3);
+            EXPECT_EQ(report.closed, 1U);
+            EXPECT_NEAR(report.thickness, thickness, 0.3e-3);
+            std::uint64_t open = 0, beside = 0;
+            for (std::size_t i = 0; i < image.values.size(); ++i) {
+                open += whole.values[i] == 2 && image.values[i] != 2 ? 1 : 0;
+                beside += whole.values[i] != 2 && image.values[i] == 2 ? 1 : 0;
+            }
+            EXPECT_LT(static_cast<double>(open), 0.15 * static_cast<double>(hole));
+            EXPECT_LT(static_cast<double>(beside), 0.25 * static_cast<double>(hole));
+        }
+    }
 }
 
 // Every voxel keeps its value at its place in the patient.

@@ -2,10 +2,13 @@
 
 #include <volume/blurred_surface.h>
 #include <volume/tissue.h>
+#include <volume/voxel_distance.h>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <utility>
@@ -167,6 +170,35 @@ TEST(Distance, OfAFaceAlongVoxelsIsThereWhereverItLiesInTheGrid)
                 EXPECT_GT(glm::dot(field.normal(p), n), 0.99999) << voxel << " " << spacing << " " << shift << " " << axis;
             }
         }
+    }
+}
+
+// To the nearest of random voxels, by trying all of them: the same with a short and a long reach, up to that.
+TEST(VoxelDistance, IsThatOfTheNearestMarkedVoxel)
+{
+    const VoxelGrid grid{{31, 24, 17}, oblique({0.7e-3, 1e-3, 2.2e-3}, Vec3(0.0), true)};
+    std::mt19937 random(4);
+    std::vector<std::uint8_t> marked(base::countOf(grid.size), 0);
+    std::vector<Vec3> places;
+    for (int i = 0; i < 12; ++i) {
+        const Index3 n(random() % 31, random() % 24, random() % 17);
+        marked[base::offsetOf(grid.size, n)] = 1;
+        places.push_back(grid.affine.toPatient(Vec3(n)));
+    }
+    for (const double reach : {1e-3, 5e-3, 12e-3, std::numeric_limits<double>::infinity()}) {
+        const std::vector<float> squares = squaredDistance(grid, marked, reach);
+        forEachIndex(Index3(0), grid.size - 1, [&](Index3 n) {
+            double nearest = std::numeric_limits<double>::infinity();
+            for (const Vec3& place : places) {
+                nearest = std::min(nearest, glm::length(place - grid.affine.toPatient(Vec3(n))));
+            }
+            const auto found = static_cast<double>(squares[base::offsetOf(grid.size, n)]);
+            if (nearest <= reach) {
+                ASSERT_NEAR(std::sqrt(found), nearest, 1e-8) << reach;
+            } else {
+                ASSERT_GT(std::sqrt(found), reach * (1 - 1e-6));
+            }
+        });
     }
 }
 

@@ -143,7 +143,9 @@ void expectImage(const Row& row, Counts counts)
 void expectSegments(const Row& row)
 {
     ImportOptions options;
-    options.fractionalThreshold = 0;  // the table counts every voxel that is not zero
+    if (row.format.find("FRACTIONAL") != std::string::npos) {
+        options.fractionalThreshold = 0.0F;  // the table counts every voxel that is not zero
+    }
     const ImportedLabels labels = importLabels(row.path, options);
     auto found = manifest::histogram(labels.image);
     found.erase(0);

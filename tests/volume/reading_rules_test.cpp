@@ -183,6 +183,18 @@ TEST_F(ReadingRules, AnSformOfZerosGivesWayToAGoodQform)
     EXPECT_NE(reason(write("a.nii", header.bytes + data)).find("the spacing in its header is wrong"), std::string::npos);
 }
 
+TEST_F(ReadingRules, AnOriginThatIsNoPlaceIsSaidToBeThat)
+{
+    NiftiFields header(2, 8);
+    header.put<std::int16_t>(254, 1).put(280, 1.0F).put(300, 1.0F).put(320, 1.0F);
+    const std::string data = bytesOf(smallRamp<std::uint8_t>());
+    EXPECT_EQ(reason(write("a.nii", header.bytes + data)), "");
+    header.put(292, std::numeric_limits<float>::quiet_NaN());
+    const std::string why = reason(write("a.nii", header.bytes + data));
+    EXPECT_NE(why.find(", 0, 0 mm: the origin in its header is wrong"), std::string::npos) << why;
+    EXPECT_EQ(why.find("spacing"), std::string::npos) << why;
+}
+
 // A fourth side of 1 is no side; volume N of several is what it would be alone.
 TEST_F(ReadingRules, OneVolumeOfFourDimensionsIsReadAndOneOfManyIsChosen)
 {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <random>
 
@@ -114,6 +115,105 @@ TEST(Resample, ThinStructuresKeepTheirVolume)
             EXPECT_EQ(Index3(n.x, n.y, 0), Index3(2, 2, 0));
         }
     });
+}
+
+// The part of a voxel of `edge` at `index` that lies between `low` and `high`, along one axis [old voxels].
+double overlap(int index, double edge, double low, double high)
+{
+    return std::max(0.0, std::min(high, (index + 1) * edge) - std::max(low, index * edge)) / edge;
+}
+
+// A sheet of one voxel in new voxels of any size fills what they overlap of it: along its normal at most half of each, so
+// that the rule for thin structures gives it exactly its volume.
+TEST(Resample, ASheetKeepsItsVolumeAtAnyRatio)
+{
+    for (const double ratio : {2.1, 2.3, 2.5, 3.1, 4.1, 10.0, 12.0}) {
+        for (int at = 30; at < 33; ++at) {
+            LabelImage image = voxelise(Index3(60), {Mat3(1e-3), Vec3(0.0)}, [](Vec3) { return 1; });
+            forEachIndex({at, 5, 5}, {at, 54, 54}, [&](Index3 n) { image.values[image.offset(n)] = 2; });
+            const VoxelGrid grid = isotropicGrid(gridOf(image), 1e-3 * ratio);
+            const ResampledLabels coarse = resampled(image, grid);
+            const StructureChange& sheet = coarse.changes.at(1);
+            EXPECT_NEAR(sheet.after / grid.affine.voxelVolume(), 2500.0 / (ratio * ratio * ratio), 0.5001)
+                << ratio << " " << at;
+        }
+    }
+}
+
+// Two sheets that share new voxels: which one wins is what the overlap of boxes says, here in closed form.
+TEST(Resample, SharesAreTheOverlapOfBoxes)
+{
+    constexpr double ratio = 2.5;
+    LabelImage image =
+        voxelise(Index3(40), {Mat3(1e-3), Vec3(0.0)}, [](Vec3 p) { return std::lround(1e3 * p.x) % 3 == 0 ? 1 : 2; });
+    const VoxelGrid grid = isotropicGrid(gridOf(image), 1e-3 * ratio);
+    ASSERT_EQ(grid.size, Index3(16));
+    const LabelImage coarse = resampled(image, grid).image;
+    for (int i = 0; i < grid.size.x; ++i) {
+        double first = 0;
+        for (int old = 0; old < image.size.x; old += 3) {
+            first += overlap(i, ratio, old, old + 1);
+        }
+        ASSERT_GT(std::abs(first - 0.5), 0.01) << "no tie";
+        EXPECT_EQ(coarse.values[coarse.offset({i, 7, 9})], first > 0.5 ? 1 : 2) << i;
+    }
+}
+
+// Whatever lies beside it, a structure has a voxel in the end: a cube of three quarters of a new voxel beside a plate that
+// fills the rest of that voxel and of no other, and cubes of two old voxels in new ones of ten.
+TEST(Resample, NoStructureVanishes)
+{
+    LabelImage image = voxelise(Index3(80), {Mat3(1e-3), Vec3(0.0)}, [](Vec3) { return 1; });
+    forEachIndex({40, 40, 40}, {42, 43, 43}, [&](Index3 n) { image.values[image.offset(n)] = 2; });
+    forEachIndex({43, 40, 40}, {43, 43, 43}, [&](Index3 n) { image.values[image.offset(n)] = 3; });
+    const ResampledLabels pair = resampled(image, isotropicGrid(gridOf(image), 4e-3));
+    EXPECT_EQ(pair.image.values[pair.image.offset(Index3(10))], 2);
+    EXPECT_EQ(countOf(pair.image, 2), 1U);
+    EXPECT_EQ(countOf(pair.image, 3), 1U);
+    EXPECT_TRUE(pair.changes.at(2).beside);
+    EXPECT_FALSE(pair.changes.at(1).beside);
+
+    std::mt19937 random(7);
+    LabelImage many = voxelise(Index3(90), {Mat3(0.5e-3), Vec3(0.0)}, [](Vec3) { return 1; });
+    for (std::uint16_t label = 2; label < 202; ++label) {
+        const Index3 at(random() % 88, random() % 88, random() % 88);
+        forEachIndex(at, at + 1, [&](Index3 n) { many.values[many.offset(n)] = label; });
+    }
+    for (const double spacing : {2e-3, 5e-3}) {
+        const ResampledLabels coarse = resampled(many, isotropicGrid(gridOf(many), spacing));
+        for (const StructureChange& change : coarse.changes) {
+            EXPECT_GT(change.after, 0.0) << change.value << " " << spacing;
+        }
+    }
+}
+
+// A structure that is not thin keeps nine tenths of its volume beside thin ones: here 45 needles of a tenth of a new voxel,
+// that only lie in it.
+TEST(Resample, ThinStructuresDoNotEatAnother)
+{
+    LabelImage image = voxelise(Index3(60), {Mat3(1e-3), Vec3(0.0)}, [](Vec3) { return 1; });
+    forEachIndex(Index3(15), Index3(44), [&](Index3 n) { image.values[image.offset(n)] = 2; });
+    for (int k = 0; k < 36; ++k) {
+        const Index3 at(17 + 5 * (k % 6), 17 + 5 * (k / 6), 15);
+        forEachIndex(at, at + Index3(1, 1, 29),
+                     [&](Index3 n) { image.values[image.offset(n)] = static_cast<std::uint16_t>(10 + k); });
+    }
+    const ResampledLabels coarse = resampled(image, isotropicGrid(gridOf(image), 5e-3));
+    const StructureChange& block = coarse.changes.at(1);
+    EXPECT_GE(block.after / block.before, 0.9);
+    for (const StructureChange& change : coarse.changes) {
+        EXPECT_GT(change.after, 0.0) << change.value;
+    }
+}
+
+// The grid ends up to half a new voxel beyond the image: a body that the image cuts goes on there.
+TEST(Resample, ACutHasNoAirAtItsEdges)
+{
+    const LabelImage image = voxelise(Index3(30), {Mat3(1e-3), Vec3(0.0)}, [](Vec3) { return 5; });
+    for (const double spacing : {0.7e-3, 1.55e-3, 2.1e-3, 7e-3}) {
+        const LabelImage out = resampled(image, isotropicGrid(gridOf(image), spacing)).image;
+        EXPECT_EQ(countOf(out, 5), out.values.size()) << spacing;
+    }
 }
 
 // Steps that lean by 20 degrees, as from a tilted gantry: a block keeps its place in the patient.

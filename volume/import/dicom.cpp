@@ -76,6 +76,7 @@ ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files
         refuseIf(objects.size() > 1, path, "holds {} DICOM SEG files of one series: name one of them", objects.size());
         return readSegmentation(objects[0], options);
     }
+    refuseThreshold(path, options);
     checkNoImage(path, objects[0], options);
     DicomVolume volume = readSeries(path, objects, options.sheared, options.progress);
     ImportedLabels out;

@@ -107,7 +107,8 @@ std::vector<Segment> separateSegments(const DicomObject& object, const Grid& gri
 {
     auto segments = base::mapped<Segment>(object.segments, [&](const LabelName& name) { return Segment{name, {}, 0}; });
     const bool fractional = object.segmentationType == "FRACTIONAL";
-    const double threshold = fractional ? static_cast<double>(options.fractionalThreshold) * object.maxFractional : 0.5;
+    const float lowest = options.fractionalThreshold.value_or(0.5F);
+    const double threshold = fractional ? static_cast<double>(lowest) * object.maxFractional : 0.5;
     std::uint64_t between = 0;
     DicomPixels pixels(object);
     std::map<std::pair<std::uint16_t, std::int64_t>, std::size_t> seen;
@@ -132,8 +133,8 @@ std::vector<Segment> separateSegments(const DicomObject& object, const Grid& gri
         }
     }
     if (fractional && between > 0) {
-        warnings.push_back(fmt::format("{} voxels have a probability between 0 and 1: from {} on they are taken as set",
-                                       between, options.fractionalThreshold));
+        warnings.push_back(
+            fmt::format("{} voxels have a probability between 0 and 1: from {} on they are taken as set", between, lowest));
     }
     return segments;
 }
@@ -180,6 +181,9 @@ ImportedLabels readSegmentation(const DicomObject& object, const ImportOptions& 
              "its type of segmentation, '{}', is not BINARY, FRACTIONAL or LABELMAP: export it again", type);
     refuseIf((type == "BINARY") != bits, object.file,
              "is a DICOM SEG of type {}, but has {} bits per voxel: export it again", type, object.bitsAllocated);
+    if (type != "FRACTIONAL") {
+        refuseThreshold(object.file, options);
+    }
     const Grid grid = gridOf(object);
     ImportedLabels out;
     out.image.size = grid.size;

@@ -156,6 +156,7 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
              "holds {} files, but no DICOM and no masks (NIfTI, NRRD, MetaImage): name a file, or the "
              "folder that holds them itself",
              all.size());
+    refuseThreshold(folder, options);
     refuseIf(volumes.size() > 65535, folder, "holds more than 65535 masks: name a folder with fewer");
     return masks(folder, volumes, options);
 }

@@ -140,6 +140,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
     checkFile(path);
     if (isVdb(path)) {
         refuseVolume(path, options);
+        refuseThreshold(path, options);
         return labelsApart(path, "OpenVDB", options, [&](const ImportOptions& o) { return vdbLabels(path, o); });
     }
     if (isDicom(path)) {
@@ -148,6 +149,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
+    refuseThreshold(path, options);
     ImportedLabels labels = labelsOf(checkedSource(path, options, options.sheared), options);
     if (options.dicomLabels) {
         labels.warnings.emplace_back("--dicom-labels decides nothing: it is no DICOM");
@@ -203,6 +205,13 @@ void refuseAxes(const std::filesystem::path& file, const ImportOptions& options)
 void refuseVolume(const std::filesystem::path& file, const ImportOptions& options)
 {
     refuseIf(options.volume > 1, file, "--volume {}: it holds one volume", options.volume);
+}
+
+void refuseThreshold(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseIf(options.fractionalThreshold.has_value(), file,
+             "--threshold {:g}: it is no fractional DICOM SEG, and holds no probabilities: leave --threshold out",
+             options.fractionalThreshold.value_or(0.0F));
 }
 
 void placeAxes(Source& source, const ImportOptions& options)

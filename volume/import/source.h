@@ -124,6 +124,8 @@ void placeAxes(const ImportOptions& options, Affine& affine, std::vector<std::st
 /// Refuses options.axes for a file that says where its axes run, and options.volume for one that can hold one volume alone.
 void refuseAxes(const std::filesystem::path& file, const ImportOptions& options);
 void refuseVolume(const std::filesystem::path& file, const ImportOptions& options);
+/// Refuses options.fractionalThreshold for labels without probabilities.
+void refuseThreshold(const std::filesystem::path& file, const ImportOptions& options);
 
 /// How far two placements of the same voxels are apart at most, in voxels of `a`.
 double voxelsApart(const Affine& a, const Affine& b, Index3 size);

@@ -150,8 +150,11 @@ void decode(const Source& source, const std::function<void(double)>& progress,
 void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings)
 {
     const Vec3 spacing = affine.spacing();
-    const bool finite = std::isfinite(affine.voxelVolume()) && std::isfinite(glm::dot(affine.origin, Vec3(1.0)));
-    refuseIf(!finite || !(spacing.x > 0 && spacing.y > 0 && spacing.z > 0), file,
+    const Vec3 origin = 1e3 * affine.origin + 0.0;  // no -0
+    refuseIf(!std::isfinite(glm::dot(affine.origin, Vec3(1.0))), file,
+             "its first voxel lies at {:g}, {:g}, {:g} mm: the origin in its header is wrong, save it again", origin.x,
+             origin.y, origin.z);
+    refuseIf(!std::isfinite(affine.voxelVolume()) || !(spacing.x > 0 && spacing.y > 0 && spacing.z > 0), file,
              "its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again", 1e3 * spacing.x,
              1e3 * spacing.y, 1e3 * spacing.z);
     refuseIf(std::max({spacing.x, spacing.y, spacing.z}) > maxSpacing ||

@@ -389,7 +389,7 @@ std::vector<PreparationStep> fill(LabelImage& image, Labeller& labels, const std
             const double volume = static_cast<double>(voxels[f]) * image.affine.voxelVolume();
             steps.push_back({step, what[f].name,
                              fmt::format("{}: {} voxels ({:.3g} ml) {}", what[f].name, voxels[f], 1e6 * volume, source),
-                             voxels[f], volume, 0});
+                             voxels[f], volume, 0, ""});
         }
     }
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -447,7 +447,7 @@ std::vector<PreparationStep> bodyFromImage(LabelImage& image, std::vector<LabelN
                          fmt::format("{:.3g} ml beside the body left out: table, clothes, or parts that hang together "
                                      "with it nowhere in the image",
                                      1e6 * finder.leftOut()),
-                         0, finder.leftOut(), 0});
+                         0, finder.leftOut(), 0, ""});
     }
     return steps;
 }

@@ -26,6 +26,21 @@ using volume::Role;
 
 constexpr double maxVoxels = 4e9;  // after resampling or padding
 
+// A label value that neither a voxel nor a name has.
+std::uint16_t freeValue(const LabelImage& image, const std::vector<LabelName>& names, const char* option)
+{
+    std::vector<bool> used(65536, false);
+    for (const std::uint16_t v : image.values) {
+        used[v] = true;
+    }
+    for (const LabelName& n : names) {
+        used[n.value] = true;
+    }
+    const auto at = std::find(used.begin() + 1, used.end(), false);
+    base::failIf(at == used.end(), "{}: every label value from 1 to 65535 is in use: save the labels with fewer", option);
+    return static_cast<std::uint16_t>(at - used.begin());
+}
+
 class Preparation {
 public:
     Preparation(LabelImage& image, std::vector<LabelName>& names, const volume::TissueTable& table,
@@ -115,7 +130,7 @@ private:
 
     void report(const std::string& step, const std::string& structure, std::uint64_t voxels, const std::string& text)
     {
-        steps_.push_back({step, structure, text, voxels, volumeOf(voxels), 0});
+        steps_.push_back({step, structure, text, voxels, volumeOf(voxels), 0, ""});
     }
 
     std::string amount(std::uint64_t voxels) const
@@ -212,13 +227,26 @@ private:
                fmt::format("resampled to {} x {} x {} voxels of {:g} mm", grid.size.x, grid.size.y, grid.size.z,
                            1e3 * options_.voxel));
         for (const volume::StructureChange& change : out.changes) {
-            const std::string regained =
-                change.regained > 0 ? fmt::format(", {} voxels given back to it: it is thin", change.regained) : "";
-            PreparationStep step{"resample", nameOf(change.value), "", change.regained, change.after, change.before};
-            step.text = fmt::format("{}: {:.4g} ml -> {:.4g} ml ({:+.2f} %){}", step.structure, 1e6 * change.before,
-                                    1e6 * change.after, 100 * (change.after / change.before - 1), regained);
-            steps_.push_back(std::move(step));
+            steps_.push_back(stepOf(change));
         }
+    }
+
+    PreparationStep stepOf(const volume::StructureChange& change) const
+    {
+        const std::string regained = change.beside ? ", other structures have its voxels: it has one beside them"
+                                     : change.regained > 0
+                                         ? fmt::format(", {} voxels given back to it: it is thin", change.regained)
+                                         : "";
+        PreparationStep step{"resample", nameOf(change.value), "", change.regained, change.after, change.before, ""};
+        step.text = fmt::format("{}: {:.4g} ml -> {:.4g} ml ({:+.2f} %){}", step.structure, 1e6 * change.before,
+                                1e6 * change.after, 100 * (change.after / change.before - 1), regained);
+        if (change.after == 0) {
+            step.warning = fmt::format(
+                "'{}' ({:.3g} ml) is lost: other structures have all voxels of {:g} mm that it is in: "
+                "resample to smaller ones",
+                step.structure, 1e6 * change.before, 1e3 * options_.voxel);
+        }
+        return step;
     }
 
     void keepLargest()
@@ -262,14 +290,28 @@ private:
         tell_("adding skin");
         volume::SkinLabels labels = skin();
         if (labels.skin == 0) {
-            labels.skin = freeLabel();
+            labels.skin = freeValue(image_, names_, "--add-skin");
             labels.isSkin[labels.skin] = 1;
             names_.push_back({labels.skin, "skin", skinTissue()});
         }
-        const auto taken = volume::addSkin(image_, labels, options_.addSkin);
-        const auto all = base::sumOf(taken, &volume::Relabelled::voxels, std::uint64_t{0});
-        report("add-skin", "skin", all, fmt::format("{} became {:g} mm of skin", amount(all), 1e3 * options_.addSkin));
-        reportTaken("add-skin", taken);
+        const volume::AddedSkin added = volume::addSkin(image_, labels, options_.addSkin);
+        const auto all = base::sumOf(added.taken, &volume::Relabelled::voxels, std::uint64_t{0});
+        const std::string thickness =
+            all == 0 ? "no tissue has a face to the outside, or all that has is skin"
+            : added.thickness > 0
+                ? fmt::format("it is {:.2g} mm thick on average, {:g} mm were asked for", 1e3 * added.thickness,
+                              1e3 * options_.addSkin)
+                : fmt::format("{:g} mm were asked for, and no other tissue is under it", 1e3 * options_.addSkin);
+        report("add-skin", "skin", all, fmt::format("{} became skin: {}", amount(all), thickness));
+        const Vec3 spacing = image_.affine.spacing();
+        if (const double widest = std::max({spacing.x, spacing.y, spacing.z});
+            all > 0 && widest > options_.addSkin * (1 + 1e-6)) {
+            steps_.back().warning = fmt::format(
+                "skin of {:g} mm was asked for, but voxels are up to {:.3g} mm wide: it is a "
+                "voxel thick there",
+                1e3 * options_.addSkin, 1e3 * widest);
+        }
+        reportTaken("add-skin", added.taken);
     }
 
     void reportTaken(const std::string& step, const std::vector<volume::Relabelled>& taken)
@@ -277,21 +319,6 @@ private:
         for (const volume::Relabelled& r : taken) {
             report(step, nameOf(r.value), r.voxels, fmt::format("{}: {} are skin now", nameOf(r.value), amount(r.voxels)));
         }
-    }
-
-    std::uint16_t freeLabel() const
-    {
-        std::vector<bool> used(65536, false);
-        for (const std::uint16_t v : image_.values) {
-            used[v] = true;
-        }
-        for (const LabelName& n : names_) {
-            used[n.value] = true;
-        }
-        const auto at = std::find(used.begin() + 1, used.end(), false);
-        base::failIf(at == used.end(),
-                     "--add-skin: every label value from 1 to 65535 is in use: save the labels with fewer");
-        return static_cast<std::uint16_t>(at - used.begin());
     }
 
     std::string skinTissue() const
@@ -325,6 +352,23 @@ private:
 };
 
 }  // namespace
+
+std::vector<PreparationStep> separateOutside(LabelImage& image, std::vector<LabelName>& names,
+                                             const volume::TissueTable& table)
+{
+    const auto zero = std::ranges::find(names, std::uint16_t{0}, &LabelName::value);
+    const auto row = zero != names.end() ? table.find(zero->tissue) : std::nullopt;
+    if (!row || table.rows[*row].role == Role::air) {
+        return {};
+    }
+    zero->value = freeValue(image, names, "label 0 is tissue");
+    zero->name = zero->name == "outside" ? "label 0" : zero->name;
+    std::ranges::replace(image.values, std::uint16_t{0}, zero->value);
+    const auto voxels = static_cast<std::uint64_t>(std::ranges::count(image.values, zero->value));
+    return {{"separate-outside", zero->name,
+             fmt::format("{}: has label {} now, not 0: voxels that are added are outside", zero->name, zero->value), voxels,
+             static_cast<double>(voxels) * image.affine.voxelVolume(), 0, ""}};
+}
 
 std::vector<PreparationStep> prepare(LabelImage& image, std::vector<LabelName>& names, const volume::TissueTable& table,
                                      const PreparationOptions& options, const std::function<void(const std::string&)>& tell)

@@ -30,9 +30,15 @@ struct PreparationStep {
     std::string structure;  // "" = the whole volume
     std::string text;       // for people
     std::uint64_t voxels = 0;
-    double volume = 0;  // [m^3]
-    double before = 0;  // resample: volume of the structure [m^3]
+    double volume = 0;    // [m^3]
+    double before = 0;    // resample: volume of the structure [m^3]
+    std::string warning;  // for people; "" = nothing to warn of
 };
+
+/// Where label 0 is tissue, gives it a free value, in `image` and `names`: 0 then is outside, as it is to all that adds
+/// voxels. Empty where there was nothing to do. Throws std::runtime_error where no value is free.
+std::vector<PreparationStep> separateOutside(volume::LabelImage& image, std::vector<volume::LabelName>& names,
+                                             const volume::TissueTable& table);
 
 /// Does to `image` what is asked for; a skin that was added gets a row in `names`. Throws std::runtime_error for structures
 /// that are not there and steps that cannot be done.

@@ -16,6 +16,7 @@
 
 #include <cmath>
 #include <ctime>
+#include <iterator>
 #include <stdexcept>
 
 namespace palpate::prepare {
@@ -78,6 +79,12 @@ volume::CompanionImage companionOf(const ImportRequest& o, const volume::Importe
     return companion;
 }
 
+// Whether something adds voxels, or asks of labels that are tissue for each.
+bool needsOutside(const ImportRequest& o)
+{
+    return o.hull > 0 || o.bodyFromImage || o.steps.voxel > 0 || o.steps.largest || o.steps.pad > 0;
+}
+
 // A body around the labels, as it is asked for; before anything else is done to them.
 std::vector<PreparationStep> addBody(const ImportRequest& o, volume::LabelImage& labels,
                                      std::vector<volume::LabelName>& named, const volume::TissueTable& table,
@@ -126,6 +133,11 @@ volume::Provenance provenanceOf(const ImportRequest& o, const volume::LabelImage
     }
     for (const std::string& note : notes) {
         provenance.emplace_back(volume::warningKey, note);
+    }
+    for (const PreparationStep& step : steps) {
+        if (!step.warning.empty()) {
+            provenance.emplace_back(volume::warningKey, step.warning);
+        }
     }
     return provenance;
 }
@@ -213,11 +225,15 @@ ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTa
     noteOverlaps(labels, request.mapping.verbose, notes);
     std::vector<volume::LabelName> named = mapLabels(request.mapping, request.input, labels, counts, table, notes);
     auto image = request.image.empty() ? std::nullopt : std::optional(readImage(request, notes, tell));
-    auto steps = addBody(request, labels.image, named, table, image ? &*image : nullptr, notes, tell);
-    for (auto& step :
-         prepare(labels.image, named, table, request.steps, [&](const std::string& what) { tell(what, {}); })) {
-        steps.push_back(std::move(step));
+    std::vector<PreparationStep> steps;
+    const auto done = [&](std::vector<PreparationStep> more) {
+        steps.insert(steps.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+    };
+    if (needsOutside(request)) {
+        done(separateOutside(labels.image, named, table));
     }
+    done(addBody(request, labels.image, named, table, image ? &*image : nullptr, notes, tell));
+    done(prepare(labels.image, named, table, request.steps, [&](const std::string& what) { tell(what, {}); }));
     std::optional<volume::CompanionImage> companion;
     if (image) {
         tell("resampling the image", {});
