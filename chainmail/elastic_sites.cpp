@@ -15,6 +15,7 @@ namespace {
 constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr int stillPeriod = 64;       // calls after which they are beside ties, which drag tissue to a tool that rests
+constexpr double smallTool = 1.5;     // radius, in cells, up to which cells lack less the deeper a tool is in its radii
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
 
 // How many sites ties take, at most.
@@ -134,9 +135,9 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 }
 
 // Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches
-// less than the cells of a window resolve, by Hertz's radius of what it touches, and the less so the deeper it is in
-// its radii (decision 321). Tissue that something rigid confines gives way less under the same pressure, by f^(1/3)
-// where it bears f times what a half-space would at this depth, and so may they: that is by how much the patch is
+// less than the cells of a window resolve, by Hertz's radius of what it touches, and a small tool the less so the deeper
+// it is in its radii (decisions 321, 334). Tissue that something rigid confines gives way less under the same pressure, by
+// f^(1/3) where it bears f times what a half-space would at this depth, and so may they: that is by how much the patch is
 // wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force on a small patch may be
 // twice too large, and tissue that relaxes, whose force falls while it lies as before, take the patch by the depth.
 // All this is kept while a call solves, so that a call keeps one energy.
@@ -165,7 +166,8 @@ void Elastic::spreadPressure() noexcept
                 knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
             patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
             const double deep = glm::length(tool.pushed) / tool.shape.widest();  // [radii]
-            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + deep) : 1.0;
+            const double small = std::min(smallTool * grid.spacing / tool.shape.widest(), 1.0);
+            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + small * small * deep) : 1.0;
             confined = byForce > byDepth ? std::pow(byForce / byDepth, std::max(1.0 - deep, 0.0)) : 1.0;
             across = betweenNodes(grid, tool);
             most = stiffestPerArea(tool);
