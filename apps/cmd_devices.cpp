@@ -161,7 +161,12 @@ nlohmann::json pushOnce(const DevicesArguments& o)
     const base::EndInOrder untilItsEnd;
     const auto wire = falcon::usbTransport();
     falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
-    link.connect(base::EndInOrder::asked());
+    try {
+        link.connect(base::EndInOrder::asked());
+    } catch (const falcon::Trouble&) {
+        failIfInterrupted();
+        throw;
+    }
     guardian.guard(wire->descriptor());
     const auto test = falcon::testForce(link, *wire, session::sayForFalcon, base::EndInOrder::asked(), guardian);
     guardian.guard(-1);
