@@ -84,7 +84,7 @@ void printGivenUp(const Plan& plan, const PlanCandidate& c)
 
 void printToml(const PlanCandidate& c)
 {
-    fmt::print("\n[model]\nlevel = \"{}\"\n", datasets::modelLevels[static_cast<std::size_t>(c.level)]);
+    fmt::print("\n[model]\nlevel = \"{}\"\n", name(c.level));
     if (c.level == ModelLevel::chainmail) {
         fmt::print("spacing_mm = {:g}\n", 1e3 * c.spacing);
     }

@@ -80,7 +80,7 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
                               {"unloaded_within_mm", 1e3 * model.posture->residual}};
     }
     figures["steps_down"] = result.stepsDown;
-    figures["model_at_end"] = datasets::modelLevels[static_cast<std::size_t>(result.level)];
+    figures["model_at_end"] = name(result.level);
     figures["device"] = info.device;
     figures["build"] = info.build;
     figures["contacts"] = result.contacts;

@@ -72,6 +72,10 @@ struct VitalStructure {
 enum class ModelLevel : std::uint8_t { spring, chainmail, elastic };
 /// Their names in scenes, records and on the command line, in the order of the enum.
 inline constexpr std::array<std::string_view, 3> modelLevels{"spring", "chainmail", "elastic"};
+constexpr std::string_view name(ModelLevel level) noexcept
+{
+    return modelLevels[static_cast<std::size_t>(level)];
+}
 
 /// Level `elastic`: equilibrium on nested windows around the tool.
 struct ElasticSettings {

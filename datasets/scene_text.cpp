@@ -337,8 +337,8 @@ std::string phantomText(const PhantomSpec& spec)
 
 std::string modelText(const ModelSettings& model)
 {
-    std::string out = fmt::format("\n[model]\nlevel = \"{}\"\n{}", modelLevels[static_cast<std::size_t>(model.level)],
-                                  writeFields<ModelSettings>(modelFields, model));
+    std::string out =
+        fmt::format("\n[model]\nlevel = \"{}\"\n{}", name(model.level), writeFields<ModelSettings>(modelFields, model));
     out += fmt::format("setting = {}\n", tomlString(model.setting));
     const volume::Law& law = model.elastic.law;
     out += fmt::format("\n[model.elastic]\nstrain = \"{}\"\n", strains[volume::isSmall(law) ? 0 : 1]);

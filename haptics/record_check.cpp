@@ -74,7 +74,7 @@ std::string sceneInWords(const SessionInfo& info)
 {
     try {
         const datasets::Scene scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
-        const auto level = datasets::modelLevels[static_cast<std::size_t>(scene.model.level)];
+        const auto level = name(scene.model.level);
         if (scene.name != info.scene || level != info.model) {
             return fmt::format("the scene is '{}' with model {}, and '{}' with model {} by its own text", info.scene,
                                info.model, scene.name, level);

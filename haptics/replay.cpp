@@ -130,7 +130,7 @@ SessionInfo infoOf(const SessionModel& model)
     info.scene = model.scene.name;
     info.sceneText = model.scene.text;
     info.volumeHash = modelHash(model);
-    info.model = datasets::modelLevels[static_cast<std::size_t>(model.scene.model.level)];
+    info.model = name(model.scene.model.level);
     info.extra.emplace_back(targetShapeKey, toText(shapeOfTarget(model)));
     if (model.scene.ct.given()) {
         info.extra.emplace_back(scanDoseKey, fmt::format("{:.12g}", model.scene.ct.doseLength()));

@@ -13,7 +13,7 @@ namespace {
 nlohmann::json candidateFigures(const PlanCandidate& c)
 {
     const bool elastic = c.level == ModelLevel::elastic;
-    nlohmann::json out{{"level", datasets::modelLevels[static_cast<std::size_t>(c.level)]},
+    nlohmann::json out{{"level", name(c.level)},
                        {"spacing_mm", 1e3 * (elastic ? c.elastic.spacing : c.spacing)},
                        {"windows", nlohmann::json::array()},
                        {"sweeps", elastic ? c.elastic.cycles : 0},

@@ -96,7 +96,7 @@ void change(Scene& scene, const SceneChanges& changes)
 
 std::string_view levelOf(const Scene& scene)
 {
-    return datasets::modelLevels[static_cast<std::size_t>(scene.model.level)];
+    return name(scene.model.level);
 }
 
 bool anyOf(const SceneChanges& c)

@@ -73,7 +73,7 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
 
 std::string_view modelOf(const SessionFigures& figures)
 {
-    return datasets::modelLevels[static_cast<std::size_t>(figures.level)];
+    return name(figures.level);
 }
 
 std::string steppedDown(const SessionFigures& figures)

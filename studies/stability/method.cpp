@@ -72,8 +72,7 @@ std::vector<StabilityMethod> ourMethods()
     using datasets::ModelLevel;
     return base::mapped<StabilityMethod>(
         std::initializer_list{ModelLevel::elastic, ModelLevel::chainmail, ModelLevel::spring}, [&](ModelLevel level) {
-            return StabilityMethod{std::string(datasets::modelLevels[static_cast<std::size_t>(level)]), running, level,
-                                   true};
+            return StabilityMethod{std::string(name(level)), running, level, true};
         });
 }
 

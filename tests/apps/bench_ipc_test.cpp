@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace palpate::apps {
 namespace {
 
@@ -33,12 +35,15 @@ TEST(BenchSync, TellsHowFarApartTwoViewersShowTheSameTick)
 {
     if (!built("palpate-view"))
         GTEST_SKIP() << "palpate-view has not been built";
-    const auto json = figures({"bench", "sync", "--seconds", "2", "--size", "320x320"});
+    const auto json = figures({"bench", "sync", "--seconds", "4", "--size", "320x320"});
     const auto &skew = json["skew_ms"], &state = json["state_ms"];
     EXPECT_GE(skew["p50"], 0.0);
     EXPECT_LE(skew["p50"], skew["p99"]);
     EXPECT_LE(skew["p99"], skew["max"]);
-    EXPECT_LT(skew["p50"], 500.0) << "pictures of the same session, not of its beginning and its end";
+    // A viewer shows a tick with the picture in work or the one after it, however long a picture takes.
+    const auto& rates = json["frames_per_second"];
+    const double longest = 1e3 / std::min(rates[0].get<double>(), rates[1].get<double>());
+    EXPECT_LT(skew["p50"], 3.0 * longest) << "pictures of the same session, not of its beginning and its end";
     EXPECT_GE(state["p50"], 0.0);
     EXPECT_GT(json["frames"], 5);
     EXPECT_EQ(json["frame_ms"], 33.0);

@@ -264,9 +264,9 @@ const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \
 
 TEST(Scene, EveryLevelAndEveryToolIsReadByItsName)
 {
-    for (const std::string_view name : modelLevels) {
-        const Scene scene = parseScene(head + fmt::format("[model]\nlevel = \"{}\"\n", name), origin);
-        EXPECT_EQ(modelLevels[static_cast<std::size_t>(scene.model.level)], name);
+    for (const std::string_view word : modelLevels) {
+        const Scene scene = parseScene(head + fmt::format("[model]\nlevel = \"{}\"\n", word), origin);
+        EXPECT_EQ(name(scene.model.level), word);
         EXPECT_EQ(parseScene(sceneText(scene), origin).model.level, scene.model.level);
     }
     EXPECT_EQ(parseScene(head + "[model]\nlevel = \"elastic\"\n", origin).model.level, ModelLevel::elastic);

@@ -149,7 +149,7 @@ TEST(Simulation, NothingIsLeftAfterRelease)
     for (const Level level : {Level::spring, Level::chainmail, Level::elastic}) {
         auto model = tests::modelOf(tests::blockScene);
         model.scene.model.level = level;
-        SCOPED_TRACE(datasets::modelLevels[static_cast<std::size_t>(level)]);
+        SCOPED_TRACE(name(level));
         Simulation simulation(model);
         stroke(simulation, -15e-3, -4e-3, 0.05, [](const TickRecord&) {});
         for (int i = 0; i < 200; ++i) {
