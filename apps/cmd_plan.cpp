@@ -42,7 +42,10 @@ std::string verdict(const PlanCandidate& c, bool chosen)
     if (!c.tried) {
         return c.holdsBudget ? "not tried: no cheaper than the choice" : "not tried: over the budget";
     }
-    return c.holdsError ? "over the budget" : c.holdsBudget ? "over the error" : "over error and budget";
+    if (c.holdsError) {
+        return c.holdsBudget ? "holds both, dearer than the choice" : "over the budget";
+    }
+    return c.holdsBudget ? "over the error" : "over error and budget";
 }
 
 void printCandidates(const Plan& plan)

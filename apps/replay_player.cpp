@@ -131,7 +131,7 @@ struct ReplayPlayer::Impl {
             event.time = static_cast<double>(now.tick) * period;
             playback.recorded.add(event);
         }
-        playback.recorded.addTip(now);
+        playback.recorded.addTick(now);
         if (now.pictures > before.pictures) {
             showShape(simulation, buffer);
             playback.recorded.addTaken(now, {buffer.nodes.data(), buffer.count});

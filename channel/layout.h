@@ -27,6 +27,7 @@ inline constexpr std::size_t maxWindows = 4;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
 inline constexpr std::size_t maxHoles = 8;
 inline constexpr std::size_t maxMarks = 32;
+inline constexpr double lookAheadReach = 40e-3;  // from the tip, along the needle [m]
 inline constexpr std::size_t nameLength = 32;
 /// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
 inline constexpr std::uint8_t rowBits = maxTissues - 1, shellBit = 0x80;
@@ -157,7 +158,8 @@ struct State {
     std::uint32_t cores = 0;                       // samples taken
     double inserted = 0;                           // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
-    std::array<double, maxStructures> ahead{};     // tip to where the needle's line touches it; infinite: nowhere near [m]
+    // From the tip to where the needle's line touches it; infinite: not within lookAheadReach, nor within the throw [m].
+    std::array<double, maxStructures> ahead{};
     double aheadTissueDistance = 0;                // tip to the next tissue on that line; infinite: nowhere near [m]
     double aheadSpeed = 0;                         // of the tip along it [m/s]
     std::uint32_t aheadTissue = 0;                 // row of the tissue table

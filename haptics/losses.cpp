@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 
 namespace palpate::haptics {
 
@@ -71,8 +72,10 @@ void LossWatch::add(const TickRecord& record) noexcept
     scorer_.add(record);
     const Score& now = scorer_.counted();
     const double seconds = static_cast<double>(record.tick) / rate_;
-    const bool better = now.bestTargetFraction > before_.bestTargetFraction || now.targetingError < before_.targetingError;
-    if (record.fired && (better || now.passes == 1)) {
+    const auto bestOf = [](const Score& s) {
+        return std::tuple(s.bestTargetFraction, s.bestTargetLength, s.targetingError);
+    };
+    if (record.fired && (bestOf(now) != bestOf(before_) || now.passes == 1)) {
         core_ = record.core;
         at_[shot] = seconds;
     }

@@ -1,5 +1,6 @@
 #include <haptics/monitor.h>
 
+#include <channel/layout.h>
 #include <haptics/events.h>
 
 #include <glm/common.hpp>
@@ -15,11 +16,12 @@ namespace {
 
 // A warning ends only this much beyond its distance, so that it cannot flicker.
 constexpr double hysteresis = 1.1;
-constexpr double graspLength = 4e-3;  // distance below which a needle's tip becomes that of the tissue at it [m]
-constexpr double monitorBand = 30.0;  // the tip's speed passes a low-pass at this frequency [Hz]
-constexpr int restSteps = 3;          // from one point of the line to the next
-constexpr int halvings = 5;           // of a step that ends in another tissue
-constexpr double farAway = 1.0;       // where a core was taken every structure is [m]
+constexpr double graspLength = 4e-3;   // distance below which a needle's tip becomes that of the tissue at it [m]
+constexpr double monitorBand = 30.0;   // the tip's speed passes a low-pass at this frequency [Hz]
+constexpr double beyondThrow = 10e-3;  // seen of what lies behind the end of a gun's throw [m]
+constexpr int restSteps = 3;           // from one point of the line to the next
+constexpr int halvings = 5;            // of a step that ends in another tissue
+constexpr double farAway = 1.0;        // where a core was taken every structure is [m]
 
 Proximity proximityOf(const GuardedStructure& s, const occupancy::Body& body, const TipState& tip, Vec3 position) noexcept
 {
@@ -113,7 +115,8 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
 
     const double radius = model.scene.tool.radius;
     const std::uint8_t here = tip.phase == Phase::inserted ? tip.tissue : 0;
-    constexpr double reach = lookAheadSteps * lookAheadStep;
+    const double reach = std::max(channel::lookAheadReach, model.scene.tool.throwLength + beyondThrow);
+    const int steps = static_cast<int>(std::lround(reach / lookAheadStep));
     const HolesNear holes(tip.needle.cuts, tip.proxy + 0.5 * reach * tool.axis, reach);
     const auto distanceTo = [&](std::size_t i, Vec3 p, bool hole) {
         const volume::DistanceField& field = model.structures[i].distance;
@@ -126,7 +129,7 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
         before[i] = distanceTo(i, rest, holes.contain(rest));
         found.structure[i] = before[i] <= radius ? 0.0 : found.structure[i];
     }
-    for (int k = 1; k <= lookAheadSteps; ++k) {
+    for (int k = 1; k <= steps; ++k) {
         const Vec3 p = tool.position + k * lookAheadStep * tool.axis;
         const Vec3 last = rest;
         rest += lookAheadStep * tool.axis;

@@ -29,8 +29,8 @@ std::array<Proximity, maxStructures> monitor(const SessionModel& model, const oc
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept;
 
 /// What is ahead of a needle at `tool` on its own line: marches through the deformed tissue in steps of lookAheadStep, as
-/// it is deformed now. A structure is touched within the needle's radius; where a core was taken nothing is left of it. Of
-/// other tools: nothing is ahead.
+/// it is deformed now, over channel::lookAheadReach and at least a gun's throw and 10 mm more. A structure is touched
+/// within the needle's radius; where a core was taken nothing is left of it. Of other tools: nothing is ahead.
 /// @param dt  period of the loop [s]
 LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
                     const TipState& tip, const DeviceSample& tool, double dt, MonitorState& state) noexcept;
@@ -40,7 +40,6 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
 void monitorThrow(const SessionModel& model, const occupancy::Body& body, Vec3 from, Vec3 to, TickRecord& record) noexcept;
 
 inline constexpr double lookAheadStep = 1e-3;  // [m]
-inline constexpr int lookAheadSteps = 40;
-inline constexpr double veryNearShare = 0.4;  // of the warning distance
+inline constexpr double veryNearShare = 0.4;   // of the warning distance
 
 }  // namespace palpate::haptics

@@ -9,6 +9,7 @@
 #include <locale>
 #include <numbers>
 #include <sstream>
+#include <tuple>
 
 namespace palpate::haptics {
 
@@ -27,14 +28,18 @@ double ramp(double value, double full, double none) noexcept
     return std::clamp((none - value) / (none - full), 0.0, 1.0);
 }
 
+double corePoints(double fraction, double length, double error) noexcept
+{
+    return 30 * std::min(1.0, fraction / 0.5) + 10 * std::min(1.0, length / 10e-3) + 10 * ramp(error, 0, 10e-3);
+}
+
 // However well it was done: who missed has no technique to be praised for.
 void addCore(const Score& s, const ScoreShares& share, ScoreParts& p) noexcept
 {
     if (s.passes == 0) {
         return;
     }
-    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
-             10 * ramp(s.targetingError, 0, 10e-3);
+    p.core = corePoints(s.bestTargetFraction, s.bestTargetLength, s.targetingError);
     const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
     p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
 }
@@ -375,14 +380,16 @@ void Scorer::addFiring(const TickRecord& record) noexcept
             error = std::max(0.0, record.events[i].value);
         }
     }
-    const double fraction = record.core.targetFraction;
-    const bool better = score_.passes == 0 || fraction > score_.bestTargetFraction ||
-                        (fraction == score_.bestTargetFraction && error < score_.targetingError);
+    const double fraction = record.core.targetFraction, length = record.core.targetLength;
+    const auto worth = [](double f, double l, double e) { return std::tuple(corePoints(f, l, e), f, -e); };
+    const bool better =
+        score_.passes == 0 ||
+        worth(fraction, length, error) > worth(score_.bestTargetFraction, score_.bestTargetLength, score_.targetingError);
     ++score_.passes;
     if (better) {
         score_.targetingError = error;
         score_.bestTargetFraction = fraction;
-        score_.bestTargetLength = record.core.targetLength;
+        score_.bestTargetLength = length;
     }
 }
 

@@ -37,8 +37,8 @@ struct Score {
     std::uint32_t skinContacts = 0;  // after at least 0.1 s off the body
     std::uint32_t redirects = 0;     // withdrawn by over 5 mm inside and pushed on again by over 5 mm
     std::uint32_t passes = 0;        // fired
-    /// Middle of the notch to target's surface, 0 inside the target, at the best firing [m]: the one with the largest share
-    /// of target, then with the smallest error. Not finite when never fired.
+    /// Middle of the notch to target's surface, 0 inside the target, at the best firing [m]: the one whose core has the
+    /// most points, then the largest share of target, then the smallest error. Not finite when never fired.
     double targetingError = std::numeric_limits<double>::infinity();
     double bestTargetFraction = 0;  // of the core of that firing
     double bestTargetLength = 0;    // [m]

@@ -26,10 +26,9 @@ constexpr std::array cycles{1, 2};
 constexpr std::size_t maxReferenceCells = 400000;  // both references take some seconds
 constexpr std::size_t maxWindowNodes = 300000;     // no budget under 5 ms pays for more
 constexpr std::size_t maxPoints = 60000;           // at which errors are looked at
-// What a candidate is taken to need before it is tried: less than it will, so that none is passed over.
-constexpr double minCycles = 0.8;  // many ticks need none
-constexpr double minTouched = 50;
-constexpr double minMoved = 200;
+// What a candidate is taken to need before it is tried, of the least that any of its kind has needed: no more than it will,
+// so that none is passed over. Cells of half the size have more contacts, and a needle has one and needs half a cycle.
+constexpr double expectedShare = 0.5;
 
 studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
 {
@@ -69,6 +68,7 @@ public:
             PlanCandidate& c = plan_.candidates[*next];
             progress_(fmt::format("{} of {}: {}", ++tried, plan_.candidates.size(), c.name()));
             attempt(c);
+            expectAtLeast(c);
         }
         std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
         plan_.choice = cheapest();
@@ -146,7 +146,6 @@ private:
             PlanCandidate c;
             c.level = ModelLevel::chainmail;
             c.spacing = spacing;
-            c.touched = minMoved;
             add(c);
         }
         for (const double spacing : spacings) {
@@ -168,8 +167,6 @@ private:
         c.elastic = model_.scene.model.elastic;
         c.elastic.spacing = spacing;
         c.elastic.window = window;
-        c.touched = minTouched;
-        c.meanCycles = minCycles;
         const chainmail::Elastic elastic(body.body, {.window = window}, studies::TrialLoad(path_).load().focus);
         c.nodes = elastic.nodes();
         c.slots = slotsOf(elastic.stack());
@@ -189,8 +186,7 @@ private:
 
     void add(PlanCandidate c)
     {
-        c.microseconds = predictedTime(c, request_.costs);
-        c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+        predict(c);
         plan_.candidates.push_back(std::move(c));
     }
 
@@ -214,7 +210,7 @@ private:
         c.tried = true;
         c.touched = c.level == ModelLevel::spring ? 0.0 : result.meanTouched;
         c.meanCycles = result.meanCycles;
-        c.microseconds = predictedTime(c, request_.costs);
+        predict(c);
         c.rms = studies::spreadOf(result.looks, &studies::TrialErrors::rms).worst;
         c.near = studies::spreadOf(result.looks, &studies::TrialErrors::near).worst;
         c.error = std::hypot(c.near, referenceError);
@@ -222,6 +218,26 @@ private:
             c.force = studies::spreadOf(result.looks, &studies::TrialErrors::force).worst;
         }
         c.holdsError = overError(c) <= 1.0;
+    }
+
+    // What a tried candidate needed bounds those of its kind that are not tried.
+    void expectAtLeast(const PlanCandidate& tried)
+    {
+        for (PlanCandidate& c : plan_.candidates) {
+            if (c.tried || c.level != tried.level || volume::isSmall(c.elastic.law) != volume::isSmall(tried.elastic.law)) {
+                continue;
+            }
+            const bool first = c.meanCycles == 0.0 && c.touched == 0.0;
+            const double cycles = expectedShare * tried.meanCycles, touched = expectedShare * tried.touched;
+            c.meanCycles = first ? cycles : std::min(c.meanCycles, cycles);
+            c.touched = first ? touched : std::min(c.touched, touched);
+            predict(c);
+        }
+    }
+
+    void predict(PlanCandidate& c) const
+    {
+        c.microseconds = predictedTime(c, request_.costs);
         c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
     }
 

@@ -68,6 +68,9 @@ std::string wayFault(const channel::Scenery& scenery, const channel::State& stat
     if (along < 0)
         return said(tr("The tip is beyond the {}: draw back"), target(scenery));
     const glm::dvec3 across = way - along * axis;
+    // Beyond what is looked at along the line, the target counts as a ball.
+    if (glm::length(way) > channel::lookAheadReach && glm::length(across) < glm::length(way) - state.distance[0])
+        return "";
     return said(tr("The needle passes the {}: its middle lies {:.0f} mm towards {}"), target(scenery),
                 millimetres(glm::length(across)), directionInWords(across));
 }

@@ -45,6 +45,12 @@ void conceal(const Concealment& what, channel::State& state)
         state.tissue = 0;
 }
 
+void conceal(const Concealment& what, History::Moment& moment)
+{
+    if (what.any())
+        moment.distance[0] = std::numeric_limits<float>::infinity();
+}
+
 // Layer by layer: each voxel takes the label of a neighbour that is shown.
 void conceal(const Concealment& what, const channel::Scenery& scenery, const channel::Grid& grid,
              std::span<std::uint8_t> labels)

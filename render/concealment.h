@@ -1,6 +1,7 @@
 #pragma once
 
 #include <channel/layout.h>
+#include <render/traces.h>
 
 #include <cstdint>
 #include <span>
@@ -21,6 +22,7 @@ struct Concealment {
 void conceal(const Concealment& what, channel::Scenery& scenery);
 /// Takes distances to the target, and what lies ahead, out of a state.
 void conceal(const Concealment& what, channel::State& state);
+void conceal(const Concealment& what, History::Moment& moment);
 /// Gives voxels of the tissues `what` names the label of what lies around them, from outside inwards. `labels` are on
 /// `grid`, x fastest. Voxels with nothing else around (a body of that tissue alone) stay as they are.
 void conceal(const Concealment& what, const channel::Scenery& scenery, const channel::Grid& grid,

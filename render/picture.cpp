@@ -354,6 +354,11 @@ void Picture::drawTraces(const ScreenPlan& plan)
     for (const Area& area : {plan.forces, plan.distances})
         if (!area.empty() && !help_.empty())
             canvas_.rectangle(area, panelColour);
+    if (recorded_ != nullptr && !(plan.forces.empty() && plan.distances.empty())) {
+        session_->history.moments = recorded_->momentsUntil(session_->state.time);
+        for (History::Moment& moment : session_->history.moments)
+            palpate::render::conceal(concealed_, moment);
+    }
     if (!plan.forces.empty() && help_.empty())
         drawForceTraces(canvas_, plan.forces, plan.font, session_->scenery, session_->history);
     if (!plan.distances.empty() && help_.empty())

@@ -24,16 +24,24 @@ void Recorded::addTaken(const channel::State& state, std::span<const channel::Di
     taken_.push_back(std::move(taken));
 }
 
-void Recorded::addTip(const channel::State& state)
+void Recorded::addTick(const channel::State& state)
 {
     const std::lock_guard lock(guard_);
     way_.add(state);
+    addTo(moments_, state);
 }
 
 std::vector<glm::dvec3> Recorded::wayUntil(double time) const
 {
     const std::lock_guard lock(guard_);
     return way_.until(time + rounding);
+}
+
+std::deque<History::Moment> Recorded::momentsUntil(double time) const
+{
+    const std::lock_guard lock(guard_);
+    const auto from = std::ranges::lower_bound(moments_, time - traceSeconds, {}, &History::Moment::time);
+    return {from, std::ranges::upper_bound(moments_, time + rounding, {}, &History::Moment::time)};
 }
 
 std::deque<Event> Recorded::eventsUntil(double time) const

@@ -95,6 +95,26 @@ double nowOf(const History& history)
 
 }  // namespace
 
+void addTo(std::deque<History::Moment>& moments, const channel::State& state)
+{
+    constexpr double length = 0.02;  // [s]
+    History::Moment moment{
+        state.time, glm::length(vec(state.basic)), glm::length(vec(state.additional)), glm::length(vec(state.total)), {}};
+    for (std::size_t s = 0; s < moment.distance.size(); ++s)
+        moment.distance[s] = static_cast<float>(state.distance[s]);
+    const double begun = moments.empty() ? moment.time + 1 : moments.back().time;
+    if (moment.time < begun || moment.time - begun >= length) {
+        moments.push_back(moment);
+        return;
+    }
+    History::Moment& last = moments.back();
+    last.basic = std::max(last.basic, moment.basic);
+    last.additional = std::max(last.additional, moment.additional);
+    last.total = std::max(last.total, moment.total);
+    for (std::size_t s = 0; s < moment.distance.size(); ++s)
+        last.distance[s] = std::min(last.distance[s], moment.distance[s]);
+}
+
 void History::add(const channel::State& state)
 {
     if (any_ && state.tick == last_.tick)
@@ -111,23 +131,7 @@ void History::add(const channel::State& state)
         while (events.size() > most)
             events.pop_front();
     }
-    Moment moment{
-        state.time, glm::length(vec(state.basic)), glm::length(vec(state.additional)), glm::length(vec(state.total)), {}};
-    for (std::size_t s = 0; s < moment.distance.size(); ++s)
-        moment.distance[s] = static_cast<float>(state.distance[s]);
-    // Between two pixel columns of a diagram the largest forces and the smallest distances count.
-    constexpr double apart = 0.02;  // [s]
-    if (!moments.empty() && moment.time >= began_ && moment.time - began_ < apart) {
-        Moment& last = moments.back();
-        last.basic = std::max(last.basic, moment.basic);
-        last.additional = std::max(last.additional, moment.additional);
-        last.total = std::max(last.total, moment.total);
-        for (std::size_t s = 0; s < moment.distance.size(); ++s)
-            last.distance[s] = std::min(last.distance[s], moment.distance[s]);
-    } else {
-        moments.push_back(moment);
-        began_ = moment.time;
-    }
+    addTo(moments, state);
     while (moments.front().time < state.time - traceSeconds)
         moments.pop_front();
     last_ = state;

@@ -14,8 +14,9 @@ namespace palpate::render {
 
 /// What a session has looked like lately, as far as the viewer has seen it.
 struct History {
+    /// 20 ms, of which the largest forces and the smallest distances count.
     struct Moment {
-        double time = 0;                                       // of the session [s]
+        double time = 0;                                       // of the session, where it begins [s]
         double basic = 0, additional = 0, total = 0;           // [N]
         std::array<float, channel::maxStructures> distance{};  // [m]
     };
@@ -34,11 +35,13 @@ struct History {
 
 private:
     channel::State last_;
-    double began_ = 0;  // time of the newest moment [s]
     bool any_ = false;
 };
 
 inline constexpr double traceSeconds = 10;
+
+/// Takes a state into the last of `moments`, or begins a new one.
+void addTo(std::deque<History::Moment>& moments, const channel::State& state);
 
 /// Forces on the hand against the limit, and distances of the tip, over the last traceSeconds.
 void drawForceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,

@@ -179,40 +179,64 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves, const std::f
     return c;
 }
 
-// Fraction of the predicted bins that lie in the corridor of the measured ones. No number lies outside.
+// What a needle that nothing held at its tip would have, and the bins that count: those in tissue.
+struct TiplessNeedle {
+    std::vector<double> force;  // [N]
+    std::size_t surface = 0;    // first bin
+};
+
+// Share of the predicted bins that lie outside the corridor of the measured ones [%]. No number lies outside.
+double shareOutside(const std::vector<double>& predicted, const Corridor& corridor, std::size_t from, std::size_t bins)
+{
+    std::size_t outside = 0;
+    for (std::size_t i = from; i < bins; ++i) {
+        outside += predicted[i] >= corridor.low[i] && predicted[i] <= corridor.high[i] ? 0 : 1;
+    }
+    return bins > from ? 1e2 * static_cast<double>(outside) / static_cast<double>(bins - from) : NAN;
+}
+
 Experiment corridorExperiment(const char* name, const char* what, const std::vector<double>& predicted,
-                              const Corridor& corridor)
+                              const TiplessNeedle& tipless, const Corridor& corridor)
 {
     Experiment e;
     e.name = name;
-    e.quantity =
-        fmt::format("{}: share of predicted bins of 2 mm outside the 5 to 95 % corridor of the held-back curves", what);
+    e.quantity = fmt::format(
+        "{}: share of predicted bins of 2 mm in tissue outside the 5 to 95 % corridor of the held-back curves", what);
     e.source = needleSource;
     e.fittedOn = split;
     e.predicted = fmt::format("{} of the curves with odd numbers", what);
     e.bound = 20.0;
-    const std::size_t bins = std::min(predicted.size(), corridor.low.size());
-    std::size_t outside = 0;
+    const std::size_t bins = std::min(predicted.size(), corridor.low.size()), from = std::min(tipless.surface, bins);
+    const double inTissue = static_cast<double>(bins - from);
     ValidateCurve ours{"predicted", {}, {}, true}, low{"5 %, held back", {}, {}, true},
         high{"95 %, held back", {}, {}, true}, mean{"mean, held back", {}, {}, true};
     double meanSpread = 0.0, meanOff = 0.0, level = 0.0;
     for (std::size_t i = 0; i < bins; ++i) {
-        const double off = predicted[i] - corridor.mean[i];
-        outside += predicted[i] >= corridor.low[i] && predicted[i] <= corridor.high[i] ? 0 : 1;
-        meanOff += off / static_cast<double>(bins);
-        level += corridor.mean[i] / static_cast<double>(bins);
-        meanSpread += 0.5 * (corridor.high[i] - corridor.low[i]) / static_cast<double>(bins);
-        e.worst = largerError(e.worst, std::abs(off));
+        if (i >= from) {
+            const double off = predicted[i] - corridor.mean[i];
+            meanOff += off / inTissue;
+            level += corridor.mean[i] / inTissue;
+            meanSpread += 0.5 * (corridor.high[i] - corridor.low[i]) / inTissue;
+            e.worst = largerError(e.worst, std::abs(off));
+        }
         for (auto [curve, value] : {std::pair(&ours, predicted[i]), std::pair(&low, corridor.low[i]),
                                     std::pair(&high, corridor.high[i]), std::pair(&mean, corridor.mean[i])}) {
             curve->add(1e3 * (static_cast<double>(i) + 0.5) * strokeStep, value);
         }
     }
-    e.error = bins > 0 ? 1e2 * static_cast<double>(outside) / static_cast<double>(bins) : NAN;
+    e.error = shareOutside(predicted, corridor, from, bins);
+    const double withoutTip = shareOutside(tipless.force, corridor, from, bins);
     e.worst *= 1e2 / level;
     e.scatter = 1e2 * meanSpread / level;
-    e.parameters = {{"mean_difference_n", meanOff}, {"mean_measured_n", level}, {"half_corridor_n", meanSpread}};
-    e.note = fmt::format("mean {:+.2f} N of {:.2f} N; predicted is the mean of {} insertions", meanOff, level, insertions);
+    e.parameters = {{"mean_difference_n", meanOff},
+                    {"mean_measured_n", level},
+                    {"half_corridor_n", meanSpread},
+                    {"without_tip_force_pct", withoutTip}};
+    e.note = fmt::format(
+        "mean {:+.2f} N of {:.2f} N; predicted is the mean of {} insertions; without any force at the tip {:.0f} % would "
+        "be "
+        "outside",
+        meanOff, level, insertions, withoutTip);
     e.picture = {
         fmt::format("Needle into human liver: {}", what), "travel of the stage [mm]", "force [N]", {ours, low, high, mean}};
     e.judge();
@@ -424,10 +448,11 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
             insertion.push_back(fit.friction[i] + tip.back());
         }
     }
-    std::vector<Experiment> out{corridorExperiment("needle-tip", "tip force", tip, tipCorridor),
-                                corridorExperiment("needle-insertion", "force on the way in", insertion, inCorridor),
-                                ruptureExperiment(ours, heldBack, liver),
-                                holdExperiment(ours.front(), liver.relaxation, heldAt, hold)};
+    const std::vector<double> none(tip.size(), 0.0);
+    std::vector<Experiment> out{
+        corridorExperiment("needle-tip", "tip force", tip, {none, fit.surface}, tipCorridor),
+        corridorExperiment("needle-insertion", "force on the way in", insertion, {fit.friction, fit.surface}, inCorridor),
+        ruptureExperiment(ours, heldBack, liver), holdExperiment(ours.front(), liver.relaxation, heldAt, hold)};
     out[0].fittedOn = "curves with even numbers: cutting force, inner walls, and where the tissue begins";
     out[1].fittedOn =
         "curves with even numbers: the same, and the friction of guide and shaft: mean of the way out, bin by bin";

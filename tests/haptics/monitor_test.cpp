@@ -54,10 +54,10 @@ TEST(LookAhead, FindsTissueAndStructureOnTheLineInClosedForm)
         EXPECT_NEAR(found.tissueDistance, -p.y, 0.1e-3);
         EXPECT_EQ(found.tissue, *table.find("gland"));
         const double touch = middle.y - p.y - std::sqrt(reach * reach - middle.x * middle.x);
-        if (std::abs(touch - lookAheadStep * lookAheadSteps) < 0.3e-3) {
+        if (std::abs(touch - channel::lookAheadReach) < 0.3e-3) {
             return;
         }
-        if (touch < lookAheadStep * lookAheadSteps) {
+        if (touch < channel::lookAheadReach) {
             EXPECT_NEAR(found.structure[1], touch, 0.25e-3) << p.y;
             EXPECT_NEAR(found.seconds(found.structure[1]), touch / 0.02, 0.05 * touch / 0.02 + 0.01);
             ++looked;
@@ -73,6 +73,26 @@ TEST(LookAhead, FindsTissueAndStructureOnTheLineInClosedForm)
     EXPECT_EQ(inside.tissue, *table.find("fat"));
     EXPECT_NEAR(inside.tissueDistance, 4e-3, 0.1e-3);
     EXPECT_TRUE(std::isinf(inside.seconds(1e-3)));
+}
+
+// A gun of 50 mm reaches farther than what is looked at without it: a coach and a hand must see what it would hit.
+TEST(LookAhead, CoversTheThrowOfTheGun)
+{
+    SessionModel model = withArtery();
+    const double reach = radius + model.scene.tool.radius;
+    const double touch = middle.y - std::sqrt(reach * reach - middle.x * middle.x);
+    for (const double length : {22e-3, 50e-3}) {
+        model.scene.tool.throwLength = length;
+        LoneNeedle needle(model);
+        MonitorState state;
+        needle.at({0, -20e-3, 0});
+        const double found = aheadOf(needle, state).structure[1];
+        if (length < touch) {
+            EXPECT_TRUE(std::isinf(found)) << found;
+        } else {
+            EXPECT_NEAR(found, touch + 20e-3, lookAheadStep);
+        }
+    }
 }
 
 // A hole that a core left from 1 mm outside gland to the middle of fat: the next tissue begins where it ends. One that

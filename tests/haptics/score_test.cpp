@@ -213,18 +213,33 @@ TEST(Score, VitalContactIsTimeInAnyVitalStructure)
     EXPECT_EQ(s.warnings, 1U);
 }
 
-TEST(Score, BestFiringHasTheLargestShareThenTheSmallestError)
+TEST(Score, BestFiringHasTheMostPointsThenTheLargestShare)
 {
     auto ticks = along({{0, 0.01}, {2, 0.01}});
-    fire(ticks[100], 1 * millimetre, 0.2, 4 * millimetre);
-    fire(ticks[200], 3 * millimetre, 0.6, 9 * millimetre);
-    fire(ticks[300], 2 * millimetre, 0.6, 8 * millimetre);
-    fire(ticks[400], -5 * millimetre, 0.1, 1 * millimetre);
+    fire(ticks[100], 1 * millimetre, 0.2, 4 * millimetre);   // 12 + 4 + 9
+    fire(ticks[200], 3 * millimetre, 0.6, 9 * millimetre);   // 30 + 9 + 7
+    fire(ticks[300], 1 * millimetre, 0.6, 8 * millimetre);   // 30 + 8 + 9
+    fire(ticks[400], -5 * millimetre, 0.1, 1 * millimetre);  // 6 + 1 + 10
     const Score s = scoreTicks(ticks);
     EXPECT_EQ(s.passes, 4U);
     EXPECT_DOUBLE_EQ(s.bestTargetFraction, 0.6);
-    EXPECT_DOUBLE_EQ(s.targetingError, 2 * millimetre);
+    EXPECT_DOUBLE_EQ(s.targetingError, 1 * millimetre);
     EXPECT_DOUBLE_EQ(s.bestTargetLength, 8 * millimetre);
+    fire(ticks[500], 1 * millimetre, 0.7, 8 * millimetre);  // as many
+    EXPECT_DOUBLE_EQ(scoreTicks(ticks).bestTargetFraction, 0.7);
+}
+
+// A second shot beside the first hole fills half of the notch. The target's share of that is larger, though its axis lies
+// in the hole.
+TEST(Score, AFurtherShotTakesNoPointsFromTheCore)
+{
+    auto ticks = along({{0, 0.01}, {2, 0.01}});
+    fire(ticks[100], 0, 0.562, 11.5 * millimetre);
+    const double before = parts(scoreTicks(ticks)).core;
+    fire(ticks[200], 0, 0.618, 0);
+    const Score s = scoreTicks(ticks);
+    EXPECT_DOUBLE_EQ(parts(s).core, before);
+    EXPECT_DOUBLE_EQ(s.bestTargetLength, 11.5 * millimetre);
 }
 
 TEST(Score, NotchInsideTheTargetHasNoError)

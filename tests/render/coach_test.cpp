@@ -93,6 +93,15 @@ TEST(Coach, SaysHowFarOffAndTowardsWhat)
     s.distance[0] = 12e-3;
     EXPECT_EQ(coach(scenery, s, view).wrong,
               "The needle passes the tumour: its middle lies 9 mm towards the patient's right");
+    // Nothing is seen along the line beyond 40 mm: a target of 10 mm, 60 mm ahead, is not missed by 3 mm, and is by 12 mm.
+    const CoachView deep{.aim = {0, 70e-3, 0}, .handIsHere = true};
+    s = stateAt(3e-3, 10e-3, 0, channel::Phase::inserted);
+    s.distance[0] = 55e-3;
+    EXPECT_EQ(coach(scenery, s, deep).wrong, "");
+    s.tip[0] = 12e-3;
+    s.distance[0] = 56.2e-3;
+    EXPECT_EQ(coach(scenery, s, deep).wrong,
+              "The needle passes the tumour: its middle lies 12 mm towards the patient's right");
     s = stateAt(0, 40e-3, 0, channel::Phase::inserted);
     s.distance[0] = 15e-3;
     EXPECT_EQ(coach(scenery, s, view).wrong, "The tip is beyond the tumour: draw back");

@@ -1,6 +1,7 @@
 #include <channel/needle_shape.h>
 #include <render/concealment.h>
 #include <render/events.h>
+#include <render/recorded.h>
 #include <render/screen_plan.h>
 #include <render/shift_field.h>
 #include <render/slice_picture.h>
@@ -220,6 +221,31 @@ TEST(History, EveryPeakIsInItsColumn)
         EXPECT_NEAR(most.time, 0.02 * peak, 0.021);
         EXPECT_NEAR(std::ranges::min_element(distance, larger)->value, 0.002, 1e-9) << peak;
     }
+}
+
+// A debrief jumps from event to event: what lies between them is drawn, though no picture showed it, and nothing that is
+// still to come.
+TEST(Recorded, TracesHoldWhatWasNotLookedAt)
+{
+    Recorded recorded;
+    channel::State state;
+    for (state.tick = 0; state.tick < 20'000; ++state.tick) {
+        state.time = 1e-3 * static_cast<double>(state.tick);
+        state.total = {state.tick == 12'007 ? 7.0 : 1.0, 0, 0};
+        state.distance[0] = 0.01;
+        recorded.addTick(state);
+    }
+    const auto peak = [](const std::deque<History::Moment>& moments) {
+        return std::ranges::max(moments, {}, &History::Moment::total).total;
+    };
+    auto moments = recorded.momentsUntil(15.0);
+    EXPECT_EQ(peak(moments), 7.0);
+    EXPECT_NEAR(moments.front().time, 15.0 - traceSeconds, 0.021);
+    EXPECT_NEAR(moments.back().time, 15.0, 0.021);
+    EXPECT_EQ(peak(recorded.momentsUntil(11.9)), 1.0);
+    EXPECT_TRUE(recorded.momentsUntil(-1.0).empty());
+    conceal({.plan = true, .tissues = {}}, moments.back());
+    EXPECT_TRUE(std::isinf(moments.back().distance[0]));
 }
 
 TEST(History, ForgetsWhatIsLaterThanAJumpBack)
