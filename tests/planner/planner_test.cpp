@@ -108,19 +108,19 @@ TEST(Planner, AForceThatIsNotKnownHoldsNoLimit)
 TEST(Planner, ChoosesWhatAnExhaustiveSearchChooses)
 {
     for (const bool needle : {false, true}) {
-        const Plan whole = planned(0.01, 1.0, true, needle);
-        EXPECT_TRUE(std::ranges::all_of(whole.candidates, &PlanCandidate::tried));
-        for (const double error : {0.01, 0.02, 0.04, 0.2}) {
-            const auto cheapest =
-                std::ranges::find_if(whole.candidates, [&](const PlanCandidate& c) { return c.error <= 100.0 * error; });
+        const Plan whole = planned(0.01, 4e-4, true, needle);
+        for (const double error : {0.04, 0.2}) {
+            const auto cheapest = std::ranges::find_if(
+                whole.candidates, [&](const PlanCandidate& c) { return c.tried && c.error <= 100.0 * error; });
             ASSERT_NE(cheapest, whole.candidates.end());
-            for (const double room : {0.99, 1.01, 1.5}) {
+            for (const double room : {0.99, 1.01}) {
                 const Plan quick = planned(error, 1e-6 * room * cheapest->microseconds, false, needle);
                 ASSERT_EQ(quick.choice.has_value(), room > 1.0) << needle << error;
                 if (quick.choice) {
                     EXPECT_EQ(quick.candidates[*quick.choice].microseconds, cheapest->microseconds) << needle << error;
                 }
-                EXPECT_LE(std::ranges::count_if(quick.candidates, &PlanCandidate::tried), std::ssize(whole.candidates));
+                const auto tried = [](const Plan& p) { return std::ranges::count_if(p.candidates, &PlanCandidate::tried); };
+                EXPECT_LE(tried(quick), tried(whole));
             }
         }
     }
