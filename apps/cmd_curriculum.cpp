@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <apps/listed.h>
+#include <apps/session_curricula.h>
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/shell_word.h>
@@ -24,7 +25,6 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <set>
 
 namespace palpate::apps {
 
@@ -96,16 +96,11 @@ void checkCurriculum(const CurriculumArguments& o)
 // That of the last session whose curriculum is there; nothing: none of them.
 std::optional<Curriculum> lastPractised(const std::vector<training::StoredSession>& sessions)
 {
-    std::set<std::string> missing;
+    Curricula curricula;
     for (auto s = sessions.rbegin(); s != sessions.rend(); ++s) {
-        if (s->curriculum.empty() || missing.contains(s->curriculum)) {
-            continue;
-        }
-        try {
-            return training::findCurriculum(s->curriculum);
-        } catch (const std::runtime_error& e) {
-            fmt::print(stderr, "palpate: warning: sessions of a missing curriculum are not counted: {}\n", e.what());
-            missing.insert(s->curriculum);
+        const Curriculum* const last = s->curriculum.empty() ? nullptr : curricula.called(s->curriculum);
+        if (last != nullptr) {
+            return *last;
         }
     }
     return std::nullopt;

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <apps/progress_figures.h>
+#include <apps/session_curricula.h>
 #include <base/counted.h>
 #include <base/error.h>
 #include <base/mapped.h>
@@ -16,9 +17,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::apps {
@@ -36,36 +35,6 @@ struct ProgressArguments {
     std::string caseId, exercise;
     fs::path profiles, html, csv, xapi, json;
     bool all = false;
-};
-
-/// Curricula that sessions name, read once: what is returned points to them.
-class Curricula {
-public:
-    /// One that was asked for has to be there. Returns its name.
-    std::string add(const std::string& asked)
-    {
-        training::Curriculum made = training::findCurriculum(asked);
-        const std::string id = made.id;
-        all_.insert_or_assign(id, std::move(made));
-        return id;
-    }
-    const training::Curriculum* called(const std::string& id)
-    {
-        const auto known = all_.find(id);
-        if (known != all_.end()) {
-            return known->second ? &*known->second : nullptr;
-        }
-        std::optional<training::Curriculum>& made = all_[id];
-        try {
-            made = training::findCurriculum(id);
-        } catch (const std::runtime_error& e) {
-            fmt::print(stderr, "palpate: warning: sessions of a missing curriculum are not counted: {}\n", e.what());
-        }
-        return made ? &*made : nullptr;
-    }
-
-private:
-    std::map<std::string, std::optional<training::Curriculum>> all_;
 };
 
 /// @param asked  curricula that are shown also where the person has not begun them

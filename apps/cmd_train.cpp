@@ -8,6 +8,7 @@
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <base/temporary_folder.h>
+#include <base/user_files.h>
 #include <base/words.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -288,7 +289,7 @@ ViewersWanted viewersFor(const TrainArguments& o, const Training& training, cons
     wanted.title = training.title();
     wanted.layout = o.layout;
     wanted.pictures = drawsLater(o) ? "" : o.pictures;
-    wanted.images = !o.ownRecord || recordFile(o).empty() ? fs::path() : recordFile(o).replace_extension(".ultrasound");
+    wanted.images = !o.ownRecord || recordFile(o).empty() ? fs::path() : base::imagesBeside(recordFile(o));
     wanted.result = result;
     wanted.hidden = o.showTarget ? std::vector<std::string>() : tissuesToFind(model);
     wanted.test = o.training.test;

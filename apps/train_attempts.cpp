@@ -1,6 +1,7 @@
 #include <apps/train_attempts.h>
 
 #include <base/inputs.h>
+#include <base/user_files.h>
 #include <base/utc.h>
 
 #include <fmt/format.h>
@@ -17,7 +18,7 @@ namespace {
 // The ultrasound pictures that are stored beside a record.
 std::vector<fs::path> picturesOf(const fs::path& record)
 {
-    return base::filesWith(".png", fs::path(record).replace_extension(".ultrasound"));
+    return base::filesWith(".png", base::imagesBeside(record));
 }
 
 // @param before  pictures that were there when it began

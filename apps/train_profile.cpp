@@ -3,6 +3,7 @@
 #include <base/counted.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/user_files.h>
 #include <base/utc.h>
 #include <training/progress.h>
 
@@ -99,8 +100,8 @@ void Training::markCut(session::TrainResult& result, std::string& record) const
     for (const char* log : {"-wal", "-shm"}) {
         fs::rename(own_.string() + log, marked.string() + log, failed);  // not there where all is in the record itself
     }
-    const fs::path images = fs::path(own_).replace_extension(".ultrasound");
-    fs::rename(images, fs::path(marked).replace_extension(".ultrasound"), failed);  // there may be none
+    const fs::path images = base::imagesBeside(own_);
+    fs::rename(images, base::imagesBeside(marked), failed);  // there may be none
     record = marked.string();
     result.problem += "; its name is now " + record;
 }

@@ -32,53 +32,38 @@ bool named(int descriptor, const std::filesystem::path& file) noexcept
 std::optional<FileLock> FileLock::of(const std::filesystem::path& file)
 {
     while (true) {
-        const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-        if (descriptor < 0) {
+        Descriptor descriptor(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666));
+        if (!descriptor) {
             fail(file, "cannot be made: check the folder and its rights", errno);
         }
         struct flock whole {};
         whole.l_type = F_WRLCK;
         whole.l_whence = SEEK_SET;
-        if (::fcntl(descriptor, F_OFD_SETLK, &whole) != 0) {
+        if (::fcntl(*descriptor, F_OFD_SETLK, &whole) != 0) {
             const int error = errno;
-            ::close(descriptor);
             if (error == EAGAIN || error == EACCES) {
                 return std::nullopt;
             }
             fail(file, "cannot be locked: choose a folder on a file system with locks", error);
         }
-        if (named(descriptor, file)) {
-            return FileLock(file, descriptor);
+        if (named(*descriptor, file)) {
+            return FileLock(file, std::move(descriptor));
         }
-        ::close(descriptor);
     }
-}
-
-FileLock::FileLock(FileLock&& other) noexcept
-    : file_(std::move(other.file_)), descriptor_(std::exchange(other.descriptor_, -1))
-{
 }
 
 FileLock::~FileLock()
 {
-    if (descriptor_ >= 0 && named(descriptor_, file_)) {
+    if (descriptor_ && named(*descriptor_, file_)) {
         ::unlink(file_.c_str());
     }
-    leave();
 }
 
 void FileLock::write(std::string_view text) const
 {
     const auto size = static_cast<ssize_t>(text.size());
-    if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, text.data(), text.size(), 0) != size) {
+    if (::ftruncate(*descriptor_, 0) != 0 || ::pwrite(*descriptor_, text.data(), text.size(), 0) != size) {
         fail(file_, "cannot be written: check the space on the disk", errno);
-    }
-}
-
-void FileLock::leave() noexcept
-{
-    if (descriptor_ >= 0) {
-        ::close(std::exchange(descriptor_, -1));
     }
 }
 

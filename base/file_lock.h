@@ -1,9 +1,11 @@
 #pragma once
 
+#include <base/descriptor.h>
+
 #include <filesystem>
 #include <optional>
-#include <string>
 #include <string_view>
+#include <utility>
 
 namespace palpate::base {
 
@@ -16,7 +18,7 @@ public:
     /// Throws std::runtime_error when the file cannot be made or the file system has no locks.
     static std::optional<FileLock> of(const std::filesystem::path& file);
 
-    FileLock(FileLock&& other) noexcept;
+    FileLock(FileLock&& other) noexcept = default;
     FileLock& operator=(FileLock&&) = delete;
     /// Removes the file and lets go.
     ~FileLock();
@@ -24,13 +26,15 @@ public:
     /// What others read in the file, in place of what was in it. Throws std::runtime_error.
     void write(std::string_view text) const;
     /// In a child after fork(), which has the lock too: leaves it to the parent, so that it ends with the parent.
-    void leave() noexcept;
+    void leave() noexcept { descriptor_ = Descriptor(); }
 
 private:
-    FileLock(std::filesystem::path file, int descriptor) : file_(std::move(file)), descriptor_(descriptor) {}
+    FileLock(std::filesystem::path file, Descriptor descriptor) : file_(std::move(file)), descriptor_(std::move(descriptor))
+    {
+    }
 
     std::filesystem::path file_;
-    int descriptor_;  // -1: let go
+    Descriptor descriptor_;  // none: let go
 };
 
 }  // namespace palpate::base

@@ -20,6 +20,12 @@ extern char** environ;
 
 namespace palpate::base {
 
+std::string hostName()
+{
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
 // Field 22 of /proc/PID/stat (proc(5)). The command's name is in brackets and may hold anything, so count from the last
 // one.
 std::uint64_t processStart(std::uint64_t pid) noexcept

@@ -9,6 +9,9 @@
 
 namespace palpate::base {
 
+/// What this machine is called in its network.
+std::string hostName();
+
 /// Start time of process `pid` [clock ticks since boot]: a recycled number has another. 0 when it is not there or dead and
 /// only not yet reaped.
 std::uint64_t processStart(std::uint64_t pid) noexcept;

@@ -38,6 +38,11 @@ fs::path trainerSettings()
     return folder.empty() ? folder : folder / "trainer.json";
 }
 
+fs::path imagesBeside(fs::path record)
+{
+    return record.replace_extension(".ultrasound");
+}
+
 std::string plainName(std::string text)
 {
     std::ranges::replace_if(

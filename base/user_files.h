@@ -15,6 +15,8 @@ enum class UserFolder { config, data, cache };
 std::filesystem::path userFolder(UserFolder kind);
 /// The window's settings, with who trained last: trainer.json in the user's config, empty where that is.
 std::filesystem::path trainerSettings();
+/// The folder of a session's ultrasound images, beside its record.
+std::filesystem::path imagesBeside(std::filesystem::path record);
 /// A text as the name of a file: ASCII signs that are no letter and no digit become '-'.
 std::string plainName(std::string text);
 /// What the pages of somebody's progress are called, without ending. Names that differ in signs only share them.

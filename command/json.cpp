@@ -5,9 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <fstream>
 #include <iostream>
-#include <system_error>
 
 namespace palpate::command {
 
@@ -23,16 +21,7 @@ void writeJson(const std::filesystem::path& file, const nlohmann::json& figures)
         base::failIf(!(std::cout << text << std::flush), "standard output: the figures cannot be written");
         return;
     }
-    // Whole or not at all; what is there and no file of the disk's (a pipe, /dev/stdout) is written as it is.
-    std::error_code none;
-    if (!std::filesystem::exists(file, none) || std::filesystem::is_regular_file(file, none)) {
-        base::writeWhole(file, text);
-        return;
-    }
-    std::ofstream out(file);
-    out << text;
-    out.close();
-    base::failIf(!out, "{}: cannot be written: check the folder and the space on the disk", file.native());
+    base::writeWhole(file, text);
 }
 
 }  // namespace palpate::command

@@ -8,7 +8,9 @@
 #include <volume/law.h>
 #include <volume/tissue.h>
 
+#include <algorithm>
 #include <array>
+#include <cassert>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -75,6 +77,13 @@ inline constexpr std::array<std::string_view, 3> modelLevels{"spring", "chainmai
 constexpr std::string_view name(ModelLevel level) noexcept
 {
     return modelLevels[static_cast<std::size_t>(level)];
+}
+/// @pre  one of modelLevels
+constexpr ModelLevel modelLevelCalled(std::string_view name) noexcept
+{
+    const auto* const at = std::find(modelLevels.begin(), modelLevels.end(), name);
+    assert(at != modelLevels.end());
+    return static_cast<ModelLevel>(at - modelLevels.begin());
 }
 
 /// Level `elastic`: equilibrium on nested windows around the tool.

@@ -1,5 +1,7 @@
 #include <haptics/hand.h>
 
+#include <haptics/motor.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -11,6 +13,8 @@ namespace {
 using datasets::TraineeStep;
 
 constexpr double triggerTime = 0.05;  // the fire button stays down [s]
+constexpr double dropFelt = 0.4;      // fraction of the force that must go for the hand to feel that tissue gave way
+constexpr double minNoticed = 0.3;    // forces below are not noticed [N]
 
 bool moves(const TraineeStep& step) noexcept
 {
@@ -19,15 +23,8 @@ bool moves(const TraineeStep& step) noexcept
 
 }  // namespace
 
-HandDevice::HandDevice(const HandParameters& parameters, std::vector<TraineeStep> script, Vec3 start, Vec3 axis,
-                       double period)
-    : parameters_(parameters),
-      period_(period),
-      script_(std::move(script)),
-      from_(start),
-      goal_(start),
-      arm_(parameters.device, parameters.grip, start, period),
-      axis_(axis)
+HandDevice::HandDevice(const HandParameters& parameters, std::vector<TraineeStep> script, Vec3 start, Vec3 axis)
+    : script_(std::move(script)), from_(start), goal_(start), arm_(parameters.device, parameters.grip, start), axis_(axis)
 {
 }
 
@@ -42,7 +39,7 @@ void HandDevice::nextStep() noexcept
 
 bool HandDevice::feltDrop() const noexcept
 {
-    return peak_ > parameters_.minFelt && glm::length(force_) < (1.0 - parameters_.dropFelt) * peak_;
+    return peak_ > minNoticed && glm::length(force_) < (1.0 - dropFelt) * peak_;
 }
 
 // Arrived, or past it: tissue that gives way may let the tip shoot beyond the mark. Inside the body also as soon as the
@@ -52,7 +49,7 @@ bool HandDevice::reached(const TraineeStep& step) const noexcept
     const Vec3 way = step.to - from_;
     const double length = glm::length(way);
     const bool onward = inside_ && glm::dot(way, axis_) > 0.0;
-    const Vec3 soon = arm_.position() + (onward ? parameters_.braking : 0.0) * arm_.velocity();
+    const Vec3 soon = arm_.position() + (onward ? braking : 0.0) * arm_.velocity();
     return glm::distance(arm_.position(), step.to) < step.tolerance ||
            (length > 0.0 && glm::dot(soon - from_, way) / length >= length) ||
            (onward && step.depth > 0.0 && inserted_ >= step.depth);
@@ -61,7 +58,7 @@ bool HandDevice::reached(const TraineeStep& step) const noexcept
 void HandDevice::advance() noexcept
 {
     const TraineeStep& step = script_[step_];
-    inStep_ += period_;
+    inStep_ += tickSeconds;
     if (!moves(step)) {
         const double seconds = step.kind == TraineeStep::Kind::fire ? 2.0 * triggerTime : step.seconds;
         if (inStep_ >= seconds) {
@@ -72,7 +69,7 @@ void HandDevice::advance() noexcept
     const Vec3 way = step.to - from_;
     const double length = glm::length(way);
     const Vec3 direction = length > 0.0 ? way / length : Vec3(0.0);
-    travelled_ = std::min(travelled_ + step.speed * period_, length + parameters_.furthestLead);
+    travelled_ = std::min(travelled_ + step.speed * tickSeconds, length + furthestLead);
     goal_ = from_ + travelled_ * direction;
     const bool pierces = step.kind == TraineeStep::Kind::pierce;
     if ((pierces ? gaveWay() : reached(step)) || (step.seconds > 0.0 && inStep_ >= step.seconds)) {

@@ -13,19 +13,14 @@ namespace palpate::haptics {
 struct HandParameters {
     DeviceParameters device = deviceParameters("premium");
     Grip grip;
-    double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
-    double dropFelt = 0.4;        // fraction of the force that must go for the hand to feel that tissue gave way
-    double minFelt = 0.3;         // forces below are not noticed [N]
-    double braking = 30e-3;       // inside the body the hand stops so long before the mark at its speed [s]; assumed
 };
 
 /// Simulated device and hand that follow a script: the hand's goal moves along straight lines, the grip pulls the stylus
 /// after it, the force of the device acts back. It lives in ticks, not in wall time: a late tick changes nothing.
 class HandDevice final : public Device {
 public:
-    /// Of a tool along `axis` (unit vector, towards its tip) whose tip starts at `start` [m]; a tick is `period` long [s].
-    HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis,
-               double period = tickSeconds);
+    /// Of a tool along `axis` (unit vector, towards its tip) whose tip starts at `start` [m].
+    HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis);
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
@@ -41,8 +36,6 @@ private:
     bool reached(const datasets::TraineeStep& step) const noexcept;
     void nextStep() noexcept;
 
-    HandParameters parameters_;
-    double period_;
     std::vector<datasets::TraineeStep> script_;
     std::size_t step_ = 0;
     double inStep_ = 0;     // time since the step began [s]

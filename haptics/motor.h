@@ -10,6 +10,9 @@
 
 namespace palpate::haptics {
 
+inline constexpr double furthestLead = 40e-3;  // how far a hand's goal runs ahead when tissue resists [m]
+inline constexpr double braking = 30e-3;  // inside the body a hand stops so long before the mark at its speed; assumed [s]
+
 /// A normally distributed number, by the sum of twelve uniform ones: mean 0, standard deviation 1, never beyond 6.
 inline double normalOf(datasets::Random& random) noexcept
 {

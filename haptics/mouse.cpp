@@ -24,14 +24,14 @@ bool isSound(const channel::Input& input) noexcept
 
 }  // namespace
 
-MouseDevice::MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period)
-    : source_(std::move(source)), period_(period), arm_(device, grip, start, period), goal_(start), axis_(axis)
+MouseDevice::MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis)
+    : source_(std::move(source)), arm_(device, grip, start), goal_(start), axis_(axis)
 {
 }
 
 void MouseDevice::listen() noexcept
 {
-    silence_ += period_;
+    silence_ += tickSeconds;
     const auto now = source_();
     if (!now || !isSound(*now) || (heard_ && now->beat == input_.beat)) {
         return;
@@ -60,13 +60,13 @@ void MouseDevice::follow() noexcept
         return;
     }
     const Vec3 way = vec(input_.target) + offset_ - goal_;
-    goal_ += bounded(way * std::min(1.0, period_ / lag), fastest * period_);
+    goal_ += bounded(way * std::min(1.0, tickSeconds / lag), fastest * tickSeconds);
 }
 
 void MouseDevice::turn() noexcept
 {
     const Vec3 way = vec(input_.axis) - axis_;
-    const Vec3 next = axis_ + bounded(way * std::min(1.0, period_ / lag), fastestTurn * period_);
+    const Vec3 next = axis_ + bounded(way * std::min(1.0, tickSeconds / lag), fastestTurn * tickSeconds);
     if (const double length = glm::length(next); length > 0.5) {
         axis_ = next / length;
     }
@@ -83,13 +83,13 @@ DeviceSample MouseDevice::read() noexcept
     DeviceSample sample;
     sample.position = arm_.read();
     sample.axis = axis_;
-    sample.probe = probe_.follow(input_.probe, period_);  // needs no dead-man switch: it gives nobody a force
+    sample.probe = probe_.follow(input_.probe);  // needs no dead-man switch: it gives nobody a force
     sample.fresh = silence_ <= longestSilence || !heard_;
     sample.buttons = input_.held != 0 ? buttonDeadMan : 0U;
-    sample.buttons |= fire_.down(input_.fires, period_) ? buttonFire : 0U;
-    sample.buttons |= mark_.down(input_.marks, period_) ? buttonMark : 0U;
-    sample.buttons |= unmark_.down(input_.unmarks, period_) ? buttonUnmark : 0U;
-    sample.buttons |= picture_.down(input_.pictures, period_) ? buttonPicture : 0U;
+    sample.buttons |= fire_.down(input_.fires) ? buttonFire : 0U;
+    sample.buttons |= mark_.down(input_.marks) ? buttonMark : 0U;
+    sample.buttons |= unmark_.down(input_.unmarks) ? buttonUnmark : 0U;
+    sample.buttons |= picture_.down(input_.pictures) ? buttonPicture : 0U;
     return sample;
 }
 

@@ -26,9 +26,8 @@ public:
     /// What the viewer has written last; nothing while there is none. Must neither allocate nor block.
     using Source = std::function<std::optional<channel::Input>()>;
 
-    /// The tip waits at `start` [m] until the viewer's hand moves it; `axis` is the tool's (unit vector), `period` a tick
-    /// [s].
-    MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period = tickSeconds);
+    /// The tip waits at `start` [m] until the viewer's hand moves it; `axis` is the tool's (unit vector).
+    MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis);
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override { arm_.write(force); }
@@ -47,7 +46,6 @@ private:
     void turn() noexcept;
 
     Source source_;
-    double period_;
     Arm arm_;
     channel::Input input_;
     bool heard_ = false;

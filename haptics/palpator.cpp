@@ -27,14 +27,13 @@ Vec3 acrossOf(Vec3 axis)
 
 }  // namespace
 
-Palpator::Palpator(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance, double period)
+Palpator::Palpator(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance)
     : skill_(skill),
-      period_(period),
       axis_(glm::normalize(model.approach.aim - model.approach.entry)),
       u_(acrossOf(axis_)),
       v_(glm::cross(axis_, u_)),
       random_(seed ^ 0x70616C70U),
-      arm_(deviceParameters(model.scene.device), {}, model.approach.entry - distance * axis_, period),
+      arm_(deviceParameters(model.scene.device), {}, model.approach.entry - distance * axis_),
       tremor_(skill.tremor, random_)
 {
     // The device's place is the middle of the fingertip: it touches a radius before it.
@@ -194,12 +193,12 @@ void Palpator::step() noexcept
 
 DeviceSample Palpator::read() noexcept
 {
-    inAct_ += period_;
+    inAct_ += tickSeconds;
     if (stage_ != Stage::done) {
         step();
         goal_ = from_ + minimumJerk(inAct_ / duration_) * (to_ - from_);
     }
-    arm_.pull(goal_ + tremor_.at(static_cast<double>(ticks_++) * period_));
+    arm_.pull(goal_ + tremor_.at(static_cast<double>(ticks_++) * tickSeconds));
     DeviceSample sample;
     sample.position = arm_.read();
     sample.axis = axis_;

@@ -15,8 +15,7 @@ namespace palpate::haptics {
 class Palpator final : public Device {
 public:
     /// Begins `distance` [m] outside the body on the planned line.
-    Palpator(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance,
-             double period = tickSeconds);
+    Palpator(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance);
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
@@ -40,7 +39,6 @@ private:
     double background() const noexcept;
 
     Skill skill_;
-    double period_;
     Vec3 origin_, axis_, u_, v_;  // planned line and across it
     datasets::Random random_;
     Arm arm_;

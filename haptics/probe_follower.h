@@ -1,6 +1,7 @@
 #pragma once
 
 #include <datasets/probe.h>
+#include <haptics/tick.h>
 
 #include <algorithm>
 #include <array>
@@ -16,17 +17,16 @@ public:
     static constexpr double lag = 0.02;         // [s]
 
     /// One tick on.
-    /// @param asked   press, slide, sweep [m], rock, tilt, turn [rad]; one that is not a number leaves it where it is
-    /// @param period  of the tick [s]
-    const datasets::ProbeMove& follow(const std::array<double, 6>& asked, double period) noexcept
+    /// @param asked  press, slide, sweep [m], rock, tilt, turn [rad]; one that is not a number leaves it where it is
+    const datasets::ProbeMove& follow(const std::array<double, 6>& asked) noexcept
     {
         using Move = datasets::ProbeMove;
         constexpr std::array<double Move::*, 6> members{&Move::press, &Move::slide, &Move::sweep,
                                                         &Move::rock,  &Move::tilt,  &Move::turn};
         for (std::size_t i = 0; i < members.size(); ++i) {
             double& now = move_.*members[i];
-            const double most = (i < 3 ? fastest : fastestTurn) * period;
-            const double way = (asked[i] - now) * std::min(1.0, period / lag);
+            const double most = (i < 3 ? fastest : fastestTurn) * tickSeconds;
+            const double way = (asked[i] - now) * std::min(1.0, tickSeconds / lag);
             now += std::isfinite(way) ? std::clamp(way, -most, most) : 0.0;
         }
         return move_;

@@ -15,8 +15,8 @@ constexpr double maxTurn = 0.5;     // from where the scene has the probe [rad]
 constexpr double maxSweep = 25e-3;  // likewise [m]
 constexpr double wanderTime = 1.0;  // after so long it has forgotten which way it went [s]
 
-ProbeHand::ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed, double period)
-    : holds_(probe.kind != datasets::ProbeKind::none), skill_(skill), period_(period), random_(seed ^ 0x70726F6265U)
+ProbeHand::ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed)
+    : holds_(probe.kind != datasets::ProbeKind::none), skill_(skill), random_(seed ^ 0x70726F6265U)
 {
     if (holds_) {
         move_.sweep = skill_.plane * normal();
@@ -68,15 +68,15 @@ datasets::ProbeMove ProbeHand::read() noexcept
         return {};
     }
     // A speed that forgets itself (Ornstein-Uhlenbeck), of standard deviation `wander`.
-    const double fades = period_ / wanderTime;
+    constexpr double fades = tickSeconds / wanderTime;
     wander_ += -fades * wander_ + skill_.wander * std::sqrt(2.0 * fades) * normal();
     if (inLook_ < lookTime) {
-        inLook_ += period_;
+        inLook_ += tickSeconds;
         const double fraction = minimumJerk(inLook_ / lookTime);
         move_.sweep = from_.sweep + fraction * (to_.sweep - from_.sweep);
         move_.turn = from_.turn + fraction * (to_.turn - from_.turn);
     } else {
-        move_.sweep = std::clamp(move_.sweep + wander_ * period_, -maxSweep, maxSweep);
+        move_.sweep = std::clamp(move_.sweep + wander_ * tickSeconds, -maxSweep, maxSweep);
     }
     return move_;
 }

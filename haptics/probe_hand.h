@@ -14,11 +14,10 @@ namespace palpate::haptics {
 /// needle whether there is a probe or not.
 class ProbeHand {
 public:
-    /// @param probe   of the scene; of kind `none` it does nothing
-    /// @param skill   how well it holds the plane on the needle
-    /// @param seed    of the session
-    /// @param period  of a tick [s]
-    ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed, double period);
+    /// @param probe  of the scene; of kind `none` it does nothing
+    /// @param skill  how well it holds the plane on the needle
+    /// @param seed   of the session
+    ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed);
 
     bool holds() const noexcept { return holds_; }
     /// Begins to take the picture's plane back to the needle as it was seen last.
@@ -39,7 +38,6 @@ private:
 
     bool holds_;
     Skill skill_;
-    double period_;
     datasets::Random random_;
     datasets::ProbeMove move_, from_, to_;
     double inLook_ = lookTime;

@@ -4,7 +4,6 @@
 #include <base/mapped.h>
 #include <haptics/score.h>
 #include <haptics/simulation.h>
-#include <volume/fnv.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -19,11 +18,9 @@ namespace palpate::haptics {
 
 void ForceHash::add(const TickRecord& record) noexcept
 {
-    volume::Fnv hash{hash_};
     for (const Vec3& f : {record.basic, record.additional, record.total}) {
-        hash.add(f);
+        hash_.add(f);
     }
-    hash_ = hash.value;
 }
 
 ReplayDevice::ReplayDevice(const Record& record)

@@ -3,6 +3,7 @@
 #include <haptics/device.h>
 #include <haptics/recorder.h>
 #include <haptics/session_model.h>
+#include <volume/fnv.h>
 
 #include <cstdint>
 #include <optional>
@@ -15,10 +16,10 @@ namespace palpate::haptics {
 class ForceHash {
 public:
     void add(const TickRecord& record) noexcept;
-    std::uint64_t value() const noexcept { return hash_; }
+    std::uint64_t value() const noexcept { return hash_.value; }
 
 private:
-    std::uint64_t hash_ = 0xcbf29ce484222325;
+    volume::Fnv hash_;
 };
 
 /// Plays the poses of a record to a live session, whose forces it does not feel.

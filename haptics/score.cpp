@@ -98,8 +98,8 @@ double scanDoseOf(const SessionInfo& info)
     return std::isfinite(dose) ? std::max(dose, 0.0) : 0.0;
 }
 
-// Weights: the list of measures is of Johnson 2012 and tissue.md's summary of published simulators; the points and the
-// limits are ours, and docs/score.md states them.
+// Weights: the list of measures is of Johnson 2012 and of published simulators; the points and the limits are ours, and
+// docs/score.md states them.
 ScoreShares sharesOf(const Score& s) noexcept
 {
     return {.hit = std::min(1.0, s.bestTargetFraction / 0.1),

@@ -19,7 +19,7 @@ namespace {
 constexpr double shaftQueried = 6e-3;
 constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
 // Out of balance by less, a tick has no cycle beyond those of its setting: a three hundredth of what a hand notices
-// (HandParameters::minFelt), and less than a step of any device's force [N].
+// (minNoticed in hand.cpp), and less than a step of any device's force [N].
 constexpr double unfeltForce = 1e-3;
 
 // How much of the tool behind its tip collision looks at [m].

@@ -19,22 +19,20 @@ constexpr std::array<Skill, 3> skills{{
     {"expert", 0.05e-3, 1.2e-3, 1.5e-3, 16e-3, 15e-3, 0.08, 0.22, 0.95, 0.45, 3, 0.06, 7e-3, 0.5e-3, 0.3e-3},
 }};
 
-constexpr double standOff = 3e-3;       // the tip waits so far before the skin [m]
-constexpr double braking = 30e-3;       // the hand stops so long before the mark at its speed; assumed [s]
-constexpr double inAirSpeed = 40e-3;    // in air [m/s]
-constexpr double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
-constexpr double tolerance = 1e-3;      // of a movement [m]
-constexpr double tooShallow = 2e-3;     // the trainee goes on [m]
-constexpr double tooDeep = 4e-3;        // and back [m]; less, and the shaft only draws the tissue along
-constexpr double shallow = 4e-3;        // drawn back to so little inside before another line is taken [m]
-constexpr double safeAhead = 1e-3;      // a vital structure nearer to the fired tip is seen as in danger [m]
-constexpr double squeezeTime = 0.05;    // the fire button stays down [s]
-constexpr double touchSpeed = 5e-3;     // towards the skin that is not to be pierced; assumed [m/s]
-constexpr double timeOnSkin = 3.3;      // a rest of three seconds, counted slowly [s]
-constexpr double lookTime = 1.0;        // at a core [s]
-constexpr double patience = 10.0;       // with a movement that does not get there [s]
-constexpr double learnt = 0.5;          // fraction of an aim's error that stays when the trainee has seen where it went
-constexpr int maxRedirects = 4;         // in one pass; then it fires or gives up
+constexpr double standOff = 3e-3;     // the tip waits so far before the skin [m]
+constexpr double inAirSpeed = 40e-3;  // in air [m/s]
+constexpr double tolerance = 1e-3;    // of a movement [m]
+constexpr double tooShallow = 2e-3;   // the trainee goes on [m]
+constexpr double tooDeep = 4e-3;      // and back [m]; less, and the shaft only draws the tissue along
+constexpr double shallow = 4e-3;      // drawn back to so little inside before another line is taken [m]
+constexpr double safeAhead = 1e-3;    // a vital structure nearer to the fired tip is seen as in danger [m]
+constexpr double squeezeTime = 0.05;  // the fire button stays down [s]
+constexpr double touchSpeed = 5e-3;   // towards the skin that is not to be pierced; assumed [m/s]
+constexpr double timeOnSkin = 3.3;    // a rest of three seconds, counted slowly [s]
+constexpr double lookTime = 1.0;      // at a core [s]
+constexpr double patience = 10.0;     // with a movement that does not get there [s]
+constexpr double learnt = 0.5;        // fraction of an aim's error that stays when the trainee has seen where it went
+constexpr int maxRedirects = 4;       // in one pass; then it fires or gives up
 constexpr int maxEntries = 8;
 constexpr int maxStrokes = 12;  // on one line
 constexpr int maxLooks = 4;     // at one picture without the tip; then it goes on blind
@@ -51,16 +49,15 @@ std::vector<std::string> skillNames()
     return base::mapped<std::string>(skills, &Skill::name);
 }
 
-Trainee::Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance, double period)
+Trainee::Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance)
     : model_(model),
       skill_(skill),
-      period_(period),
       distance_(distance),
       random_(seed ^ 0x7261696E6565U),
       arm_(deviceParameters(model.scene.device), {},
-           model.approach.entry - distance * glm::normalize(model.approach.aim - model.approach.entry), period),
+           model.approach.entry - distance * glm::normalize(model.approach.aim - model.approach.entry)),
       tremor_(skill.tremor, random_),
-      probe_(model.scene.probe, skill, seed, period)
+      probe_(model.scene.probe, skill, seed)
 {
     goal_ = arm_.position();
     axis_ = glm::normalize(model.approach.aim - model.approach.entry);
@@ -294,26 +291,26 @@ void Trainee::storePicture() noexcept
 
 DeviceSample Trainee::read() noexcept
 {
-    inAct_ += period_;
+    inAct_ += tickSeconds;
     if (act_ != Act::done) {
         advanceAct();
         followLeg();
     }
     DeviceSample sample;
-    const double now = static_cast<double>(ticks_++) * period_;
+    const double now = static_cast<double>(ticks_++) * tickSeconds;
     arm_.pull(goal_ + tremor_.at(now));
     sample.position = arm_.read();
     sample.axis = axis_;
     sample.buttons = buttonDeadMan | (act_ == Act::fire && inAct_ < squeezeTime ? buttonFire : 0U);
     sample.probe = probe_.read();
     sample.buttons |= storing_ > 0.0 ? buttonPicture : 0U;
-    storing_ -= period_;
+    storing_ -= tickSeconds;
     return sample;
 }
 
 void Trainee::observe(const TickRecord& record) noexcept
 {
-    const auto since = [this](bool now, double before) { return now ? std::max(before, 0.0) + period_ : -1.0; };
+    const auto since = [this](bool now, double before) { return now ? std::max(before, 0.0) + tickSeconds : -1.0; };
     probe_.observe(record);
     inserted_ = record.inserted;
     ahead_ = record.ahead;

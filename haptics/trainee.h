@@ -22,8 +22,7 @@ namespace palpate::haptics {
 class Trainee final : public Device {
 public:
     /// The model must outlive it. Begins `distance` [m] outside the body on its planned line.
-    Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance,
-            double period = tickSeconds);
+    Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance);
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override { arm_.write(force); }
@@ -66,7 +65,6 @@ private:
 
     const SessionModel& model_;
     Skill skill_;
-    double period_;
     double distance_;  // it draws back to, outside the body [m]
     datasets::Random random_;
     Arm arm_;

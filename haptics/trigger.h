@@ -1,5 +1,7 @@
 #pragma once
 
+#include <haptics/tick.h>
+
 #include <algorithm>
 #include <cstdint>
 
@@ -13,9 +15,8 @@ struct Trigger {
     double left = 0;         // of this one, down and up [s]
 
     /// Whether the button is down in this tick.
-    /// @param asked   presses so far, as the viewer counts them
-    /// @param period  of the tick [s]
-    bool down(std::uint32_t asked, double period) noexcept
+    /// @param asked  presses so far, as the viewer counts them
+    bool down(std::uint32_t asked) noexcept
     {
         // A viewer that could not read what the one before it had counted begins anew: that is no press.
         if (static_cast<std::int32_t>(asked - done) < 0) {
@@ -26,7 +27,7 @@ struct Trigger {
             left = 2.0 * pressed;
         }
         const bool isDown = left > pressed;
-        left = std::max(0.0, left - period);
+        left = std::max(0.0, left - tickSeconds);
         return isDown;
     }
 };

@@ -350,13 +350,6 @@ std::string ccxText(const TetMesh& mesh, std::span<const Material> materials, co
     return out.str();
 }
 
-void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
-               const std::filesystem::path& file)
-{
-    checkCcx(mesh, materials, options.law, file);
-    base::writeWhole(file, ccxText(mesh, materials, options, patch));
-}
-
 bool hasCcx()
 {
     return std::system("command -v ccx > /dev/null 2>&1") == 0;

@@ -9,7 +9,7 @@
 
 namespace palpate::reference {
 
-/// Corners of the tetrahedra, then the middles of their edges [m]: nodes of quadratic elements as exportCcx() numbers them,
+/// Corners of the tetrahedra, then the middles of their edges [m]: nodes of quadratic elements as ccxText() numbers them,
 /// from 1.
 std::vector<Vec3> quadraticNodes(const TetMesh& mesh);
 
@@ -17,13 +17,10 @@ std::vector<Vec3> quadraticNodes(const TetMesh& mesh);
 /// strain. To be asked before something is solved for `file`.
 void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file);
 
-/// Writes what Solver::prescribe() solves with P2 elements as input of CalculiX: C3D10, mm and kPa, `*ELASTIC`, or
+/// What Solver::prescribe() solves with P2 elements as input of CalculiX: C3D10, mm and kPa, `*ELASTIC`, or
 /// `*HYPERELASTIC, NEO HOOKE` with `NLGEOM`, whose energy is that of the reference where nothing stiffens: C10 = mu/2, D1 =
-/// 2/K; the kernel's is another (volume/law.h). Throws std::runtime_error for tissue that stiffens with finite strain, or a
-/// file that cannot be written. Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
-void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
-               const std::filesystem::path& file);
-/// The text of that file. @pre checkCcx()
+/// 2/K; the kernel's is another (volume/law.h). Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
+/// @pre  checkCcx()
 std::string ccxText(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options,
                     const Patch& patch);
 
@@ -40,10 +37,10 @@ struct CcxPress {
     std::vector<Vec3> centres;        // after each step [m]
 };
 
-/// Writes that as input of CalculiX: C3D10 and `*HYPERELASTIC, NEO HOOKE` as exportCcx() has them, for each centre a
+/// Writes that as input of CalculiX: C3D10 and `*HYPERELASTIC, NEO HOOKE` as ccxText() has them, for each centre a
 /// `*STEP, NLGEOM` in which the sphere goes there and one in which it rests; the part of the sphere that looks
 /// where it goes first is a shell of hexahedra that is moved as a whole, contact surface to surface with a linear pressure
-/// of 50 times the softest modulus per mm. Throws std::runtime_error as exportCcx().
+/// of 50 times the softest modulus per mm. Throws std::runtime_error as checkCcx(), and for a file that cannot be written.
 void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, const CcxPress& press,
                     const std::filesystem::path& file);
 

@@ -69,15 +69,20 @@ void fillGrid(const TetMesh& mesh, const volume::TissueTable& table, vtkUnstruct
     grid.GetFieldData()->AddArray(names);
 }
 
+std::string xmlText(vtkUnstructuredGrid& grid)
+{
+    vtkNew<vtkXMLUnstructuredGridWriter> writer;
+    writer->SetInputData(&grid);
+    writer->WriteToOutputStringOn();
+    writer->Write();
+    return writer->GetOutputString();
+}
+
 std::string vtuText(const TetMesh& mesh, const volume::TissueTable& table)
 {
     vtkNew<vtkUnstructuredGrid> grid;
     fillGrid(mesh, table, *grid);
-    vtkNew<vtkXMLUnstructuredGridWriter> writer;
-    writer->SetInputData(grid);
-    writer->WriteToOutputStringOn();
-    writer->Write();
-    return writer->GetOutputString();
+    return xmlText(*grid);
 }
 
 std::string vtkText(const TetMesh& mesh, const volume::TissueTable& table)
@@ -293,11 +298,7 @@ std::string vtuText(const TetMesh& mesh, const Solver& solver)
     grid->GetPointData()->SetVectors(displacementOf(solver.displacement(q.nodes)));
     grid->GetCellData()->AddArray(stressOf(solver));
     grid->GetCellData()->AddArray(tissue);
-    vtkNew<vtkXMLUnstructuredGridWriter> writer;
-    writer->SetInputData(grid);
-    writer->WriteToOutputStringOn();
-    writer->Write();
-    return writer->GetOutputString();
+    return xmlText(*grid);
 }
 
 }  // namespace palpate::reference

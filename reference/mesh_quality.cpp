@@ -1,5 +1,6 @@
 #include <reference/mesh_quality.h>
 
+#include <base/quantiles.h>
 #include <reference/mesh_parts.h>
 
 #include <glm/geometric.hpp>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace palpate::reference {
 
@@ -137,8 +139,7 @@ MeshQuality qualityOf(const TetMesh& mesh, std::vector<TissueQuality> tissues, d
     if (mesh.tets.empty()) {
         return q;
     }
-    std::ranges::nth_element(leasts, leasts.begin() + static_cast<std::ptrdiff_t>(leasts.size() / 2));
-    q.medianDihedral = leasts[leasts.size() / 2];
+    q.medianDihedral = base::upperMedian(std::move(leasts));
     for (const std::uint32_t p : mesh.tets[q.worst]) {
         q.worstAt += 0.25 * mesh.points[p];
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks which folder includes which, and how long files are; docs/decisions.md explains the permitted arrows.
+"""Checks which folder includes which, and how long files are; docs/architecture.md explains the permitted arrows.
 
     check_arrows.py [ROOT]      exit status 1 and one line per fault
 """

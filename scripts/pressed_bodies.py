@@ -38,12 +38,17 @@ def scene(volume, radius, entry, aim, model='setting = "SETTING"'):
         """
 
 
+def model_of(setting):
+    """What a scene says for a setting, or for MMxNODES: spacing_mm and window of [model.elastic]."""
+    if "x" not in setting:
+        return f'setting = "{setting}"'
+    spacing, window = setting.split("x")
+    return f"elastic = {{spacing_mm = {spacing}, window = {window}}}"
+
+
 def session(text, setting):
-    """A session in a scene at a setting, or at MMxNODES: spacing_mm and window of [model.elastic]."""
-    if "x" in setting:
-        spacing, window = setting.split("x")
-        text = text.replace('setting = "SETTING"', f"elastic = {{spacing_mm = {spacing}, window = {window}}}")
-    return palpate.Session(palpate.Scene.parse(text.replace("SETTING", setting)))
+    """A session in a scene at a setting, or at MMxNODES."""
+    return palpate.Session(palpate.Scene.parse(text.replace('setting = "SETTING"', model_of(setting))))
 
 
 def turn(axis, degrees):

@@ -65,8 +65,8 @@ public:
             heard_ = true;
         }
         haptics::DeviceSample sample = device_->read();
-        sample.probe = probe_.follow(asked_, haptics::tickSeconds);
-        sample.buttons |= pictures_.down(presses_, haptics::tickSeconds) ? haptics::buttonPicture : 0U;
+        sample.probe = probe_.follow(asked_);
+        sample.buttons |= pictures_.down(presses_) ? haptics::buttonPicture : 0U;
         return sample;
     }
     void write(Vec3 force) noexcept override { device_->write(force); }

@@ -3,6 +3,7 @@
 #include <base/build.h>
 #include <base/error.h>
 #include <base/inputs.h>
+#include <base/process.h>
 #include <base/utc.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
@@ -16,7 +17,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cassert>
 #include <memory>
 #include <system_error>
 
@@ -68,9 +68,7 @@ void palpated(Scene& scene)
 void change(Scene& scene, const SceneChanges& changes)
 {
     if (changes.model) {
-        const auto* const at = std::find(datasets::modelLevels.begin(), datasets::modelLevels.end(), *changes.model);
-        assert(at != datasets::modelLevels.end());
-        scene.model.level = static_cast<datasets::ModelLevel>(at - datasets::modelLevels.begin());
+        scene.model.level = datasets::modelLevelCalled(*changes.model);
     }
     if (changes.setting) {
         scene.model.setting = *changes.setting;
@@ -94,11 +92,6 @@ void change(Scene& scene, const SceneChanges& changes)
     }
 }
 
-std::string_view levelOf(const Scene& scene)
-{
-    return name(scene.model.level);
-}
-
 bool anyOf(const SceneChanges& c)
 {
     return c.model || c.setting || c.arm || c.dffb || c.trial || c.target || c.seed || c.voxelsPerSide || c.palpate ||
@@ -108,7 +101,7 @@ bool anyOf(const SceneChanges& c)
 // The text must stay the scene: a replay is built from it.
 Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
 {
-    const bool elastic = changes.model.value_or(std::string(levelOf(scene))) == "elastic";
+    const bool elastic = changes.model.value_or(std::string(name(scene.model.level))) == "elastic";
     if (changes.fit && elastic && !changes.setting && !scene.model.settingNamed) {
         changes.setting = changes.fit(scene);
     }
@@ -120,7 +113,8 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
                  "{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels");
     change(scene, changes);
     base::failIf(changes.setting && scene.model.level != datasets::ModelLevel::elastic,
-                 "{}: the tissue model is {}: --setting changes nothing; add --model elastic", origin, levelOf(scene));
+                 "{}: the tissue model is {}: --setting changes nothing; add --model elastic", origin,
+                 name(scene.model.level));
     Scene again = datasets::parseScene(datasets::sceneText(scene), origin);
     again.tissueChanges = scene.tissueChanges;  // the same, with their lines in the file
     if (changes.tool) {
@@ -151,12 +145,6 @@ void refuseNoScene(const std::filesystem::path& file)
     constexpr std::array<const char*, 9> labels{".nii", ".hdr", ".img", ".nrrd", ".nhdr", ".mha", ".mhd", ".mgz", ".dcm"};
     base::failIf(std::ranges::find(labels, end) != labels.end(),
                  "{}: is no scene: 'palpate import' makes a volume (.vdb) of a label map first", file.native());
-}
-
-std::string hostName()
-{
-    std::array<char, 256> name{};
-    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
 }  // namespace
@@ -234,7 +222,7 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
 
 void startHere(haptics::SessionInfo& info)
 {
-    info.host = hostName();
+    info.host = base::hostName();
     info.started = base::utc();
 }
 

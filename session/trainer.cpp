@@ -71,18 +71,13 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
     }
 }
 
-std::string_view modelOf(const SessionFigures& figures)
-{
-    return name(figures.level);
-}
-
 std::string steppedDown(const SessionFigures& figures)
 {
     return fmt::format(
         "too many ticks came late: from {:.1f} s on the tissue was computed by a cheaper model ({} at the end), and feels "
         "different",
         figures.steppedDownAt,
-        figures.level == datasets::ModelLevel::elastic ? "elastic with smaller windows" : modelOf(figures));
+        figures.level == datasets::ModelLevel::elastic ? "elastic with smaller windows" : name(figures.level));
 }
 
 }  // namespace
@@ -159,7 +154,7 @@ struct Trainer::Impl {
                               {"paused_s", fmt::format("{:.3f}", result.timing.paused)},
                               {"force_hash", fmt::format("{:016x}", result.forceHash)},
                               {"steps_down", fmt::format("{}", result.stepsDown)},
-                              {"model_at_end", std::string(modelOf(result))},
+                              {"model_at_end", std::string(name(result.level))},
                               {"score_total", fmt::format("{:.1f}", result.score.total)}});
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();

@@ -181,9 +181,7 @@ void drawMembers(State& state)
 {
     for (std::size_t n = 0; n < state.people.size(); ++n) {
         const std::string& name = state.people[n].name;
-        const auto& groups = state.instructor.groups;
-        const auto of = groups.find(name);
-        const int now = of != groups.end() ? of->second : 0;
+        const int now = groupOf(state.instructor, name);
         ImGui::PushID(static_cast<int>(n));
         rollsAsOne() ? words(name) : void();
         for (int group = 0; group <= 2; ++group) {

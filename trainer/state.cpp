@@ -2,6 +2,7 @@
 
 #include <base/said.h>
 #include <base/shell_word.h>
+#include <base/user_files.h>
 
 #include <fmt/format.h>
 
@@ -311,11 +312,16 @@ bool hasDraft(const Instructor& instructor, const KeptSession& session)
     return instructor.drafts.contains({session.name, session.number});
 }
 
+int groupOf(const Instructor& instructor, const std::string& person)
+{
+    const auto of = instructor.groups.find(person);
+    return of != instructor.groups.end() ? of->second : 0;
+}
+
 void putIntoGroup(State& state, const std::string& person, int group)
 {
     Instructor& i = state.instructor;
-    const auto before = i.groups.find(person);
-    if ((before != i.groups.end() ? before->second : 0) == group) {
+    if (groupOf(i, person) == group) {
         return;
     }
     i.comparison = {};
@@ -393,7 +399,7 @@ std::string titleOption(const std::string& title)
 std::vector<std::string> debriefArguments(const State& state)
 {
     Words words{{"--replay", state.files.record.string(), titleOption(chosenCase(state).title), "--layout", "trainee",
-                 "--images", std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()}};
+                 "--images", base::imagesBeside(state.files.record).string()}};
     words.addLook(state);
     words.add(state.from.has_value(), {"--at", fmt::format("{:.2f}", state.from.value_or(0))});
     words.add(!state.ghost.empty(), {"--ghost", state.ghost.string()});

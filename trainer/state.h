@@ -174,7 +174,9 @@ void peopleListed(State& state, std::vector<PersonEntry> people);
 void everybodyLoaded(State& state, Progress everybody);
 /// Whether something that was typed for this session is not kept yet.
 bool hasDraft(const Instructor& instructor, const KeptSession& session);
-/// Instructor's screen: a person goes into a group (1 or 2), or into none (0). A comparison of other groups goes.
+/// Instructor's screen: the group (1 or 2) that a person is in; 0: none.
+int groupOf(const Instructor& instructor, const std::string& person);
+/// A person goes into a group (1 or 2), or into none (0). A comparison of other groups goes.
 void putIntoGroup(State& state, const std::string& person, int group);
 /// Instructor's screen: only sessions of this case are compared; empty: all. A comparison of others goes.
 void compareCase(State& state, const std::string& caseId);

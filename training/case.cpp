@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/nearest.h>
+#include <base/png.h>
 #include <datasets/scene.h>
 #include <datasets/toml_section.h>
 #include <haptics/measures.h>
@@ -59,9 +60,9 @@ void readScene(Section& top, Case& made)
 bool isPng(const fs::path& file)
 {
     std::ifstream in(file, std::ios::binary);
-    std::string head(8, '\0');
-    in.read(head.data(), 8);
-    return in && head == "\x89PNG\r\n\x1a\n";
+    std::string head(base::pngSignature.size(), '\0');
+    in.read(head.data(), static_cast<std::streamsize>(head.size()));
+    return in && head == base::pngSignature;
 }
 
 // A volume alone has the standard biopsy on it.

@@ -116,8 +116,9 @@ double decibels(double ratio)
     return 20 * std::log10(ratio);
 }
 
-double attenuationOf(const channel::TissueSound& sound, double megahertz)
+double attenuationOf(const channel::TissueSound& sound)
 {
+    constexpr double megahertz = 9.0;
     return 2 * static_cast<double>(sound.attenuation) * std::pow(megahertz, static_cast<double>(sound.attenuationPower));
 }
 

@@ -54,8 +54,8 @@ private:
 
 /// dB of a ratio of amplitudes.
 double decibels(double ratio);
-/// Attenuation both ways [dB/cm].
-double attenuationOf(const channel::TissueSound& sound, double megahertz);
+/// Attenuation both ways at 9 MHz [dB/cm].
+double attenuationOf(const channel::TissueSound& sound);
 double reflectionOf(const channel::TissueSound& a, const channel::TissueSound& b);
 /// Correlation of two pictures' envelopes over a part; `other(sample, line)` gives the second.
 double correlation(const CheckBench& bench, int fromSample, int toSample, int fromLine, int toLine,

@@ -94,7 +94,7 @@ std::vector<Check> checkShadows(const SoundOf& soundOf)
         const double behind = bench.level(k, k + 100, bench.line(28e-3), bench.line(39e-3));
         const double beside = bench.level(k, k + 100, bench.line(6e-3), bench.line(16e-3));
         const double r = reflectionOf(gland, slab);
-        const double wanted = -100 * thick * (attenuationOf(slab, 9) - attenuationOf(gland, 9)) + 2 * decibels(1 - r * r);
+        const double wanted = -100 * thick * (attenuationOf(slab) - attenuationOf(gland)) + 2 * decibels(1 - r * r);
         out.push_back({fmt::format("speckle behind {:.0f} mm of {}, over that beside", mm * thick, tissue), "dB",
                        behind - beside, wanted, 1.0, "attenuation of the table, 1 - R^2 at both faces"});
     }

@@ -97,7 +97,7 @@ std::vector<Check> checkSpeckle(const SoundOf& soundOf)
         double sum = 0, squares = 0, n = 0;
         for (int k = 100; k < 900; ++k) {
             const double z = 100 * (k + 0.5) * static_cast<double>(bench.beam().sample());
-            const double flat = std::pow(10, attenuationOf(sound, 9) * z / 20);
+            const double flat = std::pow(10, attenuationOf(sound) * z / 20);
             for (int i = 10; i < 182; ++i, ++n) {
                 const double a = bench.amplitude(k, i) * flat;
                 sum += a;

@@ -47,7 +47,7 @@ std::vector<Check> checkReflections(const SoundOf& soundOf)
                     best = std::max(best, bench.amplitude(k, i));
                 sum += decibels(best);
             }
-            const double echo = sum / n + 100 * (plane - face - further) * attenuationOf(above, 9);
+            const double echo = sum / n + 100 * (plane - face - further) * attenuationOf(above);
             if (std::abs(echo - wanted) > std::abs(worst - wanted))
                 worst = echo;
         }
@@ -74,7 +74,7 @@ std::vector<Check> checkAttenuation(const SoundOf& soundOf)
             sxx += x * x;
             sxy += x * y;
         }
-        const double wanted = attenuationOf(sound, 9);
+        const double wanted = attenuationOf(sound);
         out.push_back({fmt::format("attenuation of {} at 9 MHz", tissue), "dB/cm",
                        -(sxy - sx * sy / n) / (sxx - sx * sx / n), wanted, 0.03 * wanted,
                        "2 a f^p of the table, both ways"});

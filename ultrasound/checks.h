@@ -25,7 +25,7 @@ struct Check {
 using SoundOf = std::function<channel::TissueSound(std::string_view)>;
 
 /// All checks, one group after the other: `progress` is called with the share that is done. Half a minute.
-std::vector<Check> runChecks(const SoundOf& soundOf, const std::function<void(double)>& progress = {});
+std::vector<Check> runChecks(const SoundOf& soundOf, const std::function<void(double)>& progress);
 
 // The groups, each on bodies of its own.
 std::vector<Check> checkReflections(const SoundOf& soundOf);

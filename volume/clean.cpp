@@ -20,11 +20,6 @@ namespace {
 constexpr std::array<Index3, 6> faces{Index3(-1, 0, 0), Index3(1, 0, 0),  Index3(0, -1, 0),
                                       Index3(0, 1, 0),  Index3(0, 0, -1), Index3(0, 0, 1)};
 
-std::size_t countOf(const LabelImage& image)
-{
-    return image.values.size();
-}
-
 // Calls visit(index of run, y, z) for every run.
 template <typename Visit>
 void forEachRun(const Pieces& pieces, Index3 size, const Visit& visit)
@@ -153,7 +148,7 @@ std::vector<std::uint8_t> outsideOf(const LabelImage& image, const std::vector<s
         const bool border = run.first == 0 || run.last == last.x || y == 0 || y == last.y || z == 0 || z == last.z;
         open[run.parent] |= border ? std::uint8_t{1} : std::uint8_t{0};
     });
-    std::vector<std::uint8_t> outside(countOf(image), 0);
+    std::vector<std::uint8_t> outside(image.values.size(), 0);
     forEachRun(pieces, image.size, [&](std::uint32_t i, int y, int z) {
         const RowRun& run = pieces.runs()[i];
         if (open[run.parent] != 0) {
@@ -182,7 +177,7 @@ std::vector<Relabelled> relabel(LabelImage& image, const SkinLabels& labels, con
 // The tissue that has a face to the outside: 1 where it is no skin, 2 where it is.
 LabelImage surfaceOf(const LabelImage& image, const SkinLabels& labels, const std::vector<std::uint8_t>& outside)
 {
-    LabelImage surface{image.size, image.affine, std::vector<std::uint16_t>(countOf(image), 0)};
+    LabelImage surface{image.size, image.affine, std::vector<std::uint16_t>(image.values.size(), 0)};
     forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
         const std::uint16_t value = image.values[image.offset(n)];
         const bool open = labels.air[value] == 0 && std::ranges::any_of(faces, [&](Index3 face) {
@@ -312,7 +307,7 @@ ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double a
 {
     const std::vector<std::uint8_t> outside = outsideOf(image, labels.air);
     LabelImage surface = surfaceOf(image, labels, outside);
-    std::vector<std::uint8_t> others(countOf(image), 0), holes(countOf(image), 0);
+    std::vector<std::uint8_t> others(image.values.size(), 0), holes(image.values.size(), 0);
     std::transform(surface.values.begin(), surface.values.end(), others.begin(),
                    [](std::uint16_t s) { return static_cast<std::uint8_t>(s == 2 ? 1 : 0); });
     ClosedHoles out;
@@ -339,7 +334,7 @@ ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double a
     if (out.closed > 0) {
         const double deepest = out.thickness + 0.5 * voxel;
         const float most = reachSquared(deepest);
-        std::vector<std::uint8_t> wanted(countOf(image));
+        std::vector<std::uint8_t> wanted(image.values.size());
         std::transform(depth.begin(), depth.end(), wanted.begin(),
                        [&](float d) { return static_cast<std::uint8_t>(d <= most ? 1 : 0); });
         depth = squaredDistance(grid, holes, deepest);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/falcon/link.h>
+#include <haptics/tick.h>
 
 #include <cstdint>
 #include <functional>
@@ -29,14 +30,12 @@ private:
 /// One button for what reads it all the time: it changes once all readings have said so for a while.
 class SteadyButton {
 public:
-    explicit SteadyButton(double settled = Presses::settled) : settled_(settled) {}
-    /// @param down    of a reading
-    /// @param period  since the one before [s]
-    /// @returns       whether it is down
-    bool take(bool down, double period) noexcept
+    /// @param down  of a tick's reading
+    /// @returns     whether it is down
+    bool take(bool down) noexcept
     {
-        since_ = down == down_ ? 0.0 : since_ + period;
-        if (since_ >= settled_) {
+        since_ = down == down_ ? 0.0 : since_ + haptics::tickSeconds;
+        if (since_ >= Presses::settled) {
             down_ = down;
             since_ = 0.0;
         }
@@ -44,7 +43,6 @@ public:
     }
 
 private:
-    double settled_;    // [s]
     double since_ = 0;  // [s]
     bool down_ = false;
 };

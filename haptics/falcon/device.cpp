@@ -18,8 +18,8 @@ Mat3 facing(Vec3 axis) noexcept
     return {glm::cross(up, -axis), up, -axis};
 }
 
-FalconDevice::FalconDevice(std::shared_ptr<Driver> driver, Vec3 start, Vec3 axis, double period)
-    : driver_(std::move(driver)), start_(start), axis_(axis), turn_(facing(axis)), period_(period)
+FalconDevice::FalconDevice(std::shared_ptr<Driver> driver, Vec3 start, Vec3 axis)
+    : driver_(std::move(driver)), start_(start), axis_(axis), turn_(facing(axis))
 {
 }
 
@@ -37,9 +37,9 @@ DeviceSample FalconDevice::read() noexcept
     const auto down = [this](std::uint8_t button) { return (pose_.buttons & button) != 0U; };
     sample.buttons = down(buttonCentre) ? buttonDeadMan : 0U;
     // A packet has no checksum, and contacts bounce: neither may fire the gun.
-    sample.buttons |= fire_.take(down(buttonForward), period_) ? buttonFire : 0U;
-    sample.buttons |= mark_.take(down(buttonRight), period_) ? buttonMark : 0U;
-    leftHeld_ = down(buttonLeft) ? leftHeld_ + period_ : 0.0;
+    sample.buttons |= fire_.take(down(buttonForward)) ? buttonFire : 0U;
+    sample.buttons |= mark_.take(down(buttonRight)) ? buttonMark : 0U;
+    leftHeld_ = down(buttonLeft) ? leftHeld_ + tickSeconds : 0.0;
     ending_ = ending_ || leftHeld_ >= endHeld;
     return sample;
 }

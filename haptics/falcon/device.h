@@ -23,9 +23,8 @@ public:
     static constexpr double fresh = 5e-3;   // a pose is for so long: a Falcon on a hub answers every 2 ms or so [s]
     static constexpr double endHeld = 1.0;  // of the left button [s]
 
-    /// The tip starts at `start`, patient frame [m]; `axis` is the tool's, towards its tip (unit vector), `period` a tick
-    /// [s].
-    FalconDevice(std::shared_ptr<Driver> driver, Vec3 start, Vec3 axis, double period = haptics::tickSeconds);
+    /// The tip starts at `start`, patient frame [m]; `axis` is the tool's, towards its tip (unit vector).
+    FalconDevice(std::shared_ptr<Driver> driver, Vec3 start, Vec3 axis);
 
     haptics::DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
@@ -36,7 +35,6 @@ private:
     std::shared_ptr<Driver> driver_;
     Vec3 start_, axis_;
     Mat3 turn_;  // Falcon's frame to the patient's
-    double period_;
     GripPose pose_;
     Vec3 origin_{0.0};  // grip at the start, Falcon's frame [m]
     bool started_ = false;

@@ -51,8 +51,7 @@ std::vector<std::size_t> standardObjects()
 datasets::ModelSettings settingsOf(const ThesisArguments& o)
 {
     datasets::ModelSettings settings;
-    const auto* const at = std::ranges::find(datasets::modelLevels, o.level);
-    settings.level = static_cast<datasets::ModelLevel>(at - datasets::modelLevels.begin());
+    settings.level = datasets::modelLevelCalled(o.level);
     settings.setting = o.setting;
     settings.elastic = datasets::elasticSetting(o.setting);
     return settings;
@@ -84,7 +83,7 @@ std::string timeGraphics(haptics::SessionModel& model, const EventOptions& optio
     const base::TemporaryFolder scratch("what the viewers write");
     const auto timeline = scratch / "timeline.csv";
     const std::string session = fmt::format("bench-tasks-{}", getpid());
-    haptics::Broadcast broadcast(session, model, true);
+    haptics::Broadcast broadcast(session, model, channel::handIsViewers);
     const auto started = Clock::now();
     base::ChildProcess viewer(
         program, {"--session", session, "--hidden", "--size", "640x480", "--wait", "1", "--timeline", timeline.string()},

@@ -4,6 +4,7 @@
 #include <datasets/tables.h>
 
 #include <tests/apps/program.h>
+#include <tests/error_of.h>
 
 #include <gtest/gtest.h>
 
@@ -67,12 +68,7 @@ std::string sceneWith(const std::string& section, const std::string& line)
 
 std::string refusal(const std::string& text)
 {
-    try {
-        datasets::parseScene(text, "scene.toml");
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
+    return tests::errorOf([&] { datasets::parseScene(text, "scene.toml"); });
 }
 
 TEST(Documents, RangesOfScenesAreTheParsers)

@@ -1,6 +1,7 @@
 #include <channel/channel.h>
 #include <channel/segment.h>
 #include <tests/channel/example.h>
+#include <tests/error_of.h>
 
 #include <gtest/gtest.h>
 
@@ -28,16 +29,6 @@ bool listed(const std::string& session)
 {
     const auto all = sessions();
     return std::find(all.begin(), all.end(), session) != all.end();
-}
-
-std::string messageOf(const std::function<void()>& action)
-{
-    try {
-        action();
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return {};
 }
 
 // Runs `action` in a forked process that keeps what it has made until it is killed.
@@ -98,11 +89,11 @@ TEST(Session, APipeUnderItsNameHoldsNobodyUp)
     const std::string file = segmentFolder + segmentName(session);
     ASSERT_EQ(::mkfifo(file.c_str(), 0666), 0);
     EXPECT_TRUE(ends([] { sessions(); }));
-    EXPECT_TRUE(ends([&] { messageOf([&] { Subscriber::attach(session); }); }));
-    EXPECT_TRUE(ends([&] { messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }); }));
+    EXPECT_TRUE(ends([&] { tests::errorOf([&] { Subscriber::attach(session); }); }));
+    EXPECT_TRUE(ends([&] { tests::errorOf([&] { Publisher(session, smallScenery(), smallLabels()); }); }));
     EXPECT_TRUE(ends([&] { const Publisher other(session + "-other", smallScenery(), smallLabels()); }));
-    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }), "");
-    EXPECT_NE(messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("somebody else"),
+    EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }), "");
+    EXPECT_NE(tests::errorOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("somebody else"),
               std::string::npos);
     ::unlink(file.c_str());
 }
@@ -171,7 +162,7 @@ TEST(Session, ALiveOneIsNotTakenOver)
     const std::string session = sessionNamed("two");
     Publisher publisher(session, smallScenery(), smallLabels());
     publisher.setState(stateOf(7));
-    const std::string message = messageOf([&] { Publisher(session, smallScenery(), smallLabels()); });
+    const std::string message = tests::errorOf([&] { Publisher(session, smallScenery(), smallLabels()); });
     EXPECT_NE(message.find("running already (pid " + std::to_string(::getpid()) + ")"), std::string::npos) << message;
     const auto subscriber = Subscriber::attach(session);
     ASSERT_TRUE(subscriber);
@@ -259,7 +250,7 @@ TEST(Session, OfAProcessThatCannotBeSeenStays)
     RawSegment(segmentName(session)).at<Header>(0).ownerPid = 999999999;  // no process has this number
     const Publisher other(sessionNamed("beside"), smallScenery(), smallLabels());
     EXPECT_TRUE(inMemory(segmentName(session)));
-    EXPECT_NE(messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("in another container"),
+    EXPECT_NE(tests::errorOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("in another container"),
               std::string::npos);
     EXPECT_TRUE(inMemory(segmentName(session)));
 }
@@ -328,15 +319,15 @@ TEST(Session, OfAnotherVersionOrLayoutIsRefusedInWords)
     auto& header = raw.at<Header>(0);
 
     header.version = version + 1;
-    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("version " + std::to_string(version + 1)),
+    EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }).find("version " + std::to_string(version + 1)),
               std::string::npos);
     header.version = version;
     header.layoutHash ^= 1U;
-    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("different layouts"), std::string::npos);
+    EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }).find("different layouts"), std::string::npos);
     EXPECT_FALSE(listed(session));
     header.layoutHash ^= 1U;
     header.stateOffset = header.bytes - 8;
-    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
+    EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
 }
 
 TEST(Session, HalfBuiltOrForeignSegmentsAreRefused)
@@ -344,7 +335,7 @@ TEST(Session, HalfBuiltOrForeignSegmentsAreRefused)
     const std::string session = sessionNamed("foreign");
     for (const std::size_t bytes : {std::size_t{10}, sizeof(Header), std::size_t{1} << 20U}) {
         const RawSegment raw(segmentName(session), bytes);
-        EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("not made by palpate"), std::string::npos);
+        EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }).find("not made by palpate"), std::string::npos);
         removeSegment(session);
     }
 }
@@ -437,7 +428,7 @@ TEST(Session, AnImageThatDoesNotFillTheGridOrHasNoWindowIsRefused)
     Scenery many = sceneryWithImage();
     many.windows = maxWindows + 1;
     const auto refused = [&](const Scenery& scenery, const std::vector<std::uint16_t>& image) {
-        return messageOf([&] { Publisher(session, scenery, smallLabels(), image); }).find("an image of") !=
+        return tests::errorOf([&] { Publisher(session, scenery, smallLabels(), image); }).find("an image of") !=
                std::string::npos;
     };
     EXPECT_TRUE(refused(sceneryWithImage(), cut));
@@ -457,7 +448,7 @@ TEST(Session, WhoseImageIsNotWhatTheSceneryClaimsIsRefused)
     auto& scenery = raw.at<Scenery>(header.sceneryOffset);
     const auto refused = [&](auto& field, auto value) {
         const auto before = std::exchange(field, value);
-        const bool damaged = messageOf([&] { Subscriber::attach(session); }).find("damaged") != std::string::npos;
+        const bool damaged = tests::errorOf([&] { Subscriber::attach(session); }).find("damaged") != std::string::npos;
         field = before;
         return damaged;
     };
@@ -486,10 +477,10 @@ TEST(Session, BringsFineLabelsToViewers)
         EXPECT_EQ(std::vector<std::uint8_t>(viewer->fine().begin(), viewer->fine().end()), fine);
         RawSegment raw(segmentName(session));
         raw.at<Header>(0).fineBytes = 23;
-        EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
+        EXPECT_NE(tests::errorOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
     }
     fine.pop_back();
-    EXPECT_NE(messageOf([&] { Publisher(session, scenery, smallLabels(), {}, fine); }).find("23 fine labels"),
+    EXPECT_NE(tests::errorOf([&] { Publisher(session, scenery, smallLabels(), {}, fine); }).find("23 fine labels"),
               std::string::npos);
     EXPECT_FALSE(listed(session));
 }

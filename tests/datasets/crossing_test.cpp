@@ -1,5 +1,6 @@
 #include <datasets/approach.h>
 #include <datasets/tables.h>
+#include <tests/error_of.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -52,12 +53,7 @@ Scene sceneFor(const Tissue& tissue)
 
 std::string errorOf(const Scene& scene, const Tissue& tissue)
 {
-    try {
-        proposeApproaches(scene, tissue, 3);
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "";
+    return tests::errorOf([&] { proposeApproaches(scene, tissue, 3); });
 }
 
 int lungs(Vec3 p)

@@ -1,5 +1,6 @@
 #include <datasets/label_map.h>
 #include <datasets/tables.h>
+#include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -184,13 +185,8 @@ std::string errorOfMap(const std::string& text)
 {
     const Folder folder;
     std::ofstream(folder / "s.toml") << text;
-    try {
-        stiffnessMap(folder / "s.toml", "HU", defaultTissues());
-    } catch (const std::runtime_error& e) {
-        const std::string what = e.what();
-        return what.substr(what.rfind('/') + 1);
-    }
-    return "no error";
+    const std::string what = tests::errorOf([&] { stiffnessMap(folder / "s.toml", "HU", defaultTissues()); });
+    return what.substr(what.rfind('/') + 1);
 }
 
 TEST(StiffnessMap, IsLinearBetweenItsPointsAndConstantBeyond)
@@ -207,7 +203,7 @@ TEST(StiffnessMap, IsLinearBetweenItsPointsAndConstantBeyond)
 
 TEST(StiffnessMap, ErrorsNameFileLineAndRemedy)
 {
-    EXPECT_EQ(errorOfMap("points = [[0, 1], [10, 2]]\ntissues = [\"fat\"]\n"), "no error");
+    EXPECT_EQ(errorOfMap("points = [[0, 1], [10, 2]]\ntissues = [\"fat\"]\n"), "");
     EXPECT_NE(errorOfMap("points = [[10, 1], [0, 2]]\n").find("s.toml:1: points"), std::string::npos);
     EXPECT_NE(errorOfMap("points = [[0, 0]]\n").find("factors from 0.001"), std::string::npos);
     EXPECT_NE(errorOfMap("unit = \"T1\"\npoints = [[0, 1]]\n").find("the image is in HU"), std::string::npos);

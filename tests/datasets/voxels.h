@@ -1,5 +1,6 @@
 #pragma once
 
+#include <base/cells.h>
 #include <volume/tissue.h>
 
 #include <cstdint>
@@ -13,8 +14,7 @@ struct Voxels {
     explicit Voxels(const volume::Tissue& tissue) : size(tissue.size()), edge(tissue.affine().spacing().x)
     {
         const volume::Tissue::Reader reader(tissue);
-        values.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) *
-                       static_cast<std::size_t>(size.z));
+        values.reserve(base::countOf(size));
         for (int k = 0; k < size.z; ++k) {
             for (int j = 0; j < size.y; ++j) {
                 for (int i = 0; i < size.x; ++i) {
@@ -24,16 +24,8 @@ struct Voxels {
         }
     }
 
-    bool contains(Index3 n) const
-    {
-        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size.x && n.y < size.y && n.z < size.z;
-    }
-    std::size_t offset(Index3 n) const
-    {
-        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                   static_cast<std::size_t>(size.x) +
-               static_cast<std::size_t>(n.x);
-    }
+    bool contains(Index3 n) const { return base::holds(size, n); }
+    std::size_t offset(Index3 n) const { return base::offsetOf(size, n); }
     std::uint16_t at(Index3 n) const { return values[offset(n)]; }
 
     template <class Visit>

@@ -96,7 +96,7 @@ TEST(FalconButtons, ASteadyButtonIsPressedOnce)
     for (int tick = 0; tick < 1000; ++tick) {
         const bool bounces = tick >= 400 && tick < 415;
         const bool down = tick % 100 == 50 ? tick < 400 : bounces ? tick % 4 < 2 : tick >= 415 && tick < 800;
-        const bool now = button.take(down, 1e-3);
+        const bool now = button.take(down);
         presses += now && !before ? 1 : 0;
         before = now;
     }

@@ -1,3 +1,4 @@
+#include <base/outputs.h>
 #include <reference/box_mesh.h>
 #include <reference/ccx.h>
 #include <tests/error_of.h>
@@ -58,7 +59,7 @@ void expectAgreement(const Problem& problem)
     }
     const tests::Folder folder;
     const auto file = folder.path() / "problem.inp";
-    exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, file);
+    base::writeWhole(file, ccxText(problem.mesh, problem.materials, problem.options, problem.patch));
     const CcxSolution theirs = runCcx(file);
 
     Solver solver(problem.mesh, problem.materials, problem.options);
@@ -98,7 +99,7 @@ TEST(Ccx, RefusesTissueOfTheMeshThatStiffens)
     const auto file = folder.path() / "problem.inp";
     Problem problem = pressedBlock(NeoHookean{}, 1e-3);
     problem.materials.push_back({3e3, 0.45, 2.0});
-    exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, file);
+    base::writeWhole(file, ccxText(problem.mesh, problem.materials, problem.options, problem.patch));
     EXPECT_TRUE(std::filesystem::exists(file));
     problem.materials[0].stiffening = 2.0;
     EXPECT_NE(tests::errorOf([&] { checkCcx(problem.mesh, problem.materials, NeoHookean{}, file); }).find("stiffens by 2"),
@@ -155,7 +156,7 @@ TEST(Ccx, TissueThatStiffensIsRefused)
     Problem problem = pressedBlock(NeoHookean{}, 1e-3);
     problem.materials[0].stiffening = 1.0;
     const tests::Folder folder;
-    EXPECT_THROW(exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, folder.path() / "problem.inp"),
+    EXPECT_THROW(checkCcx(problem.mesh, problem.materials, problem.options.law, folder.path() / "problem.inp"),
                  std::runtime_error);
 }
 

@@ -1,6 +1,7 @@
 #include <studies/accuracy/conforming.h>
 #include <studies/kernel/baselines/factored.h>
 
+#include <tests/error_of.h>
 #include <tests/studies/small_block.h>
 
 #include <fmt/format.h>
@@ -11,7 +12,6 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <stdexcept>
 #include <string>
 
 namespace palpate::studies {
@@ -90,13 +90,8 @@ TEST(ConformingTets, TheirForceIsThatOfTheLattice)
 TEST(ConformingTets, WhatCannotBeMeshedIsSaidOnOneLine)
 {
     const auto& tissue = *meshed().model.tissue;
-    const auto said = [&](const std::filesystem::path& program, double size, std::size_t points) -> std::string {
-        try {
-            conformingTets(program, tissue, size, 0.45, points);
-        } catch (const std::runtime_error& e) {
-            return e.what();
-        }
-        return "";
+    const auto said = [&](const std::filesystem::path& program, double size, std::size_t points) {
+        return tests::errorOf([&] { conformingTets(program, tissue, size, 0.45, points); });
     };
     for (const std::string& text :
          {said(mesher, 5e-3, 10), said("/nowhere/palpate-mesh", 5e-3, plenty), said(mesher, -1.0, plenty)}) {

@@ -45,12 +45,7 @@ PosePath read(const std::string& text)
 
 std::string refusal(const std::string& text)
 {
-    try {
-        read(text);
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "none";
+    return tests::errorOf([&] { read(text); });
 }
 
 const ToolSpec ball = toolOf(ToolKind::sphere, 5e-3, 0.0);

@@ -1,4 +1,5 @@
 // Readers that break down take nobody with them.
+#include <tests/error_of.h>
 #include <volume/import/barrier.h>
 
 #include <gtest/gtest.h>
@@ -20,12 +21,7 @@ ImportedLabels labelsOf(const LabelReader& read, const ImportOptions& options = 
 
 std::string reason(const LabelReader& read)
 {
-    try {
-        labelsOf(read);
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "";
+    return tests::errorOf([&] { labelsOf(read); });
 }
 
 // Everything that is read comes over whole, more of it than a pipe holds at once.

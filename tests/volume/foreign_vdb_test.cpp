@@ -1,4 +1,5 @@
 // OpenVDB files of other programs.
+#include <tests/error_of.h>
 #include <volume/grids.h>
 #include <volume/import.h>
 
@@ -22,12 +23,7 @@ std::filesystem::path written(const openvdb::GridPtrVec& grids)
 
 std::string reason(const std::filesystem::path& file)
 {
-    try {
-        importLabels(file);
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
+    return tests::errorOf([&] { importLabels(file); });
 }
 
 // Label (x + 2 y + 3 z) % 5 in a block that begins at (-2, 1, 3), voxels of 0.5: world units are millimetres.

@@ -1,6 +1,7 @@
 // Real files of many writers, against counts that independent readers made (MANIFEST.md beside them).
 #include "manifest.h"
 
+#include <tests/error_of.h>
 #include <tests/volume/files.h>
 #include <volume/import.h>
 
@@ -56,16 +57,6 @@ void expectReason(const Row& row, const std::string& what, const std::string& re
     EXPECT_NE(what.find(": "), std::string::npos) << what;
 }
 
-std::string reasonOf(const std::function<void()>& work)
-{
-    try {
-        work();
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-}
-
 void expectPlace(const Row& row, Index3 size, const Affine& a)
 {
     std::string said = row.size;
@@ -99,7 +90,7 @@ void expectLabels(const Row& row, const Counts& counts)
     ImportOptions options;
     options.dicomLabels = row.name.ends_with(".dcm");  // label values in files of modality CT
     if (options.dicomLabels) {
-        expectReason(row, reasonOf([&] { importLabels(row.path); }), "so an image");
+        expectReason(row, tests::errorOf([&] { importLabels(row.path); }), "so an image");
     }
     const ImportedLabels labels = importLabels(row.path, options);
     const auto found = manifest::histogram(labels.image);
@@ -166,13 +157,13 @@ void expectSeries(const Row& row)
     EXPECT_NEAR(1e3 * image.affine.spacing().z, std::stod(gaps), row.name.find("gantry") != std::string::npos ? 1.5 : 1e-3)
         << row.name;
     // A series of CT or MR is an image, and comes in as labels only for who says so and when its values could be labels.
-    expectReason(row, reasonOf([&] { importLabels(row.path); }), "so an image");
+    expectReason(row, tests::errorOf([&] { importLabels(row.path); }), "so an image");
     ImportOptions options;
     options.dicomLabels = true;
     std::sort(image.values.begin(), image.values.end());
     const bool negative = image.values.front() < 0;
     const auto different = std::unique(image.values.begin(), image.values.end()) - image.values.begin();
-    const std::string why = reasonOf([&] { importLabels(row.path, options); });
+    const std::string why = tests::errorOf([&] { importLabels(row.path, options); });
     EXPECT_EQ(why.empty(), !negative && different <= 1024 && shearOf(image.affine) < 0.01) << row.name << why;
 }
 
@@ -197,19 +188,19 @@ void judge(const Row& row)
     if (refused != refusals().end()) {
         ImportOptions options;
         options.dicomLabels = true;
-        expectReason(row, reasonOf([&] { importLabels(row.path, options); }), refused->second);
-        expectReason(row, reasonOf([&] { importImage(row.path); }), refused->second);
+        expectReason(row, tests::errorOf([&] { importLabels(row.path, options); }), refused->second);
+        expectReason(row, tests::errorOf([&] { importImage(row.path); }), refused->second);
         return;
     }
     if (row.isSegmentation()) {
-        expectReason(row, reasonOf([&] { importImage(row.path); }), "is a DICOM SEG");
+        expectReason(row, tests::errorOf([&] { importImage(row.path); }), "is a DICOM SEG");
         return expectSegments(row);
     }
     if (row.isSeries()) {
         return expectSeries(row);
     }
     if (row.counts.rfind("L0 ", 0) == 0) {
-        expectReason(row, reasonOf([&] { importImage(row.path); }), "2 layers");
+        expectReason(row, tests::errorOf([&] { importImage(row.path); }), "2 layers");
         return expectLayers(row);
     }
     if (row.name == "nifti_rs/minimal2.hdr") {  // the table's reader did not look for minimal2.img.gz
@@ -223,7 +214,7 @@ void judge(const Row& row)
     }
     const bool empty = counts.different == 1 && counts.most == 0;
     const bool sheared = row.name == "niivue_labels/shear.nii.gz";
-    expectReason(row, reasonOf([&] { importLabels(row.path); }),
+    expectReason(row, tests::errorOf([&] { importLabels(row.path); }),
                  sheared ? "sheared by 18.5 degrees"
                  : empty ? "no voxel is set"
                          : "give the segmentation");
@@ -367,7 +358,7 @@ TEST(Manifest, FoldersOfMasksBecomeOneLabelMap)
     EXPECT_EQ(std::count(organs.image.values.begin(), organs.image.values.end(), organs.names[0].value), 39350);
     ASSERT_EQ(organs.warnings.size(), 1U);
     EXPECT_NE(organs.warnings[0].find("without a voxel are left out: heart"), std::string::npos);
-    EXPECT_NE(reasonOf([&] { importLabels(data); }).find("give the segmentation"), std::string::npos);
+    EXPECT_NE(tests::errorOf([&] { importLabels(data); }).find("give the segmentation"), std::string::npos);
 }
 
 // Half of a file is never taken for all of it.

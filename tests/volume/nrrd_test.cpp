@@ -1,4 +1,5 @@
 // NRRD files made here: every encoding, every order of axes, layers of segments that overlap.
+#include <tests/error_of.h>
 #include <tests/folder.h>
 #include <tests/volume/files.h>
 #include <volume/import.h>
@@ -28,12 +29,7 @@ protected:
     }
     std::string reason(const std::string& bytes, const ImportOptions& options = {}) const
     {
-        try {
-            importLabels(write("a.nrrd", bytes), options);
-            return "";
-        } catch (const std::runtime_error& e) {
-            return e.what();
-        }
+        return tests::errorOf([&] { importLabels(write("a.nrrd", bytes), options); });
     }
 
     const tests::Folder folder;

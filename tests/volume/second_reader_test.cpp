@@ -1,6 +1,7 @@
 // Real files through ITK (which has GDCM inside), as a second reader: the same value in the same place.
 #include "manifest.h"
 
+#include <base/cells.h>
 #include <volume/import.h>
 
 #include <gtest/gtest.h>
@@ -56,8 +57,7 @@ Second read(itk::ImageIOBase& io, const fs::path& file)
         }
     }
     io.SetIORegion(region);
-    const auto count =
-        static_cast<std::size_t>(out.size.x) * static_cast<std::size_t>(out.size.y) * static_cast<std::size_t>(out.size.z);
+    const std::size_t count = base::countOf(out.size);
     const std::map<Type, std::function<std::vector<double>()>> readers = {
         {Type::UCHAR, [&] { return doubles<unsigned char>(io, count); }},
         {Type::SHORT, [&] { return doubles<short>(io, count); }},

@@ -30,7 +30,7 @@ Source readMgh(const std::filesystem::path& file)
     Source source;
     source.header = source.data = file;
     source.encoding = looksLike(file, 0);
-    const std::vector<std::byte> bytes = unpackedBytes(file, 0, source.encoding, 0, headerBytes);
+    const std::vector<std::byte> bytes = unpackedBytes(file, source.encoding, 0, headerBytes);
     refuseIf(bytes.size() < headerBytes || bigEndian<std::int32_t>(bytes, 0) != 1, file,
              "is not a FreeSurfer volume, its header does not begin with version 1: save it again");
     const auto integer = [&](std::size_t at) { return bigEndian<std::int32_t>(bytes, at); };

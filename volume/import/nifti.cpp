@@ -198,7 +198,7 @@ bool isLength(const std::vector<std::byte>& bytes, std::size_t length, bool swap
 NiftiHeader readNiftiHeader(const std::filesystem::path& file)
 {
     const Encoding encoding = looksLike(file, 0);
-    std::vector<std::byte> bytes = unpackedBytes(file, 0, encoding, 0, NiftiHeader::secondBytes);
+    std::vector<std::byte> bytes = unpackedBytes(file, encoding, 0, NiftiHeader::secondBytes);
     refuseIf(bytes.size() < NiftiHeader::firstBytes, file,
              "ends after {} bytes, but a NIfTI header has {}: get the file again", bytes.size(), NiftiHeader::firstBytes);
     for (const bool swapped : {false, true}) {
@@ -285,7 +285,7 @@ std::vector<SegmentName> extensionNames(const Source& source, std::size_t header
         return {};
     }
     const std::vector<std::byte> bytes =
-        unpackedBytes(source.data, 0, source.encoding, headerBytes, source.skip - headerBytes);
+        unpackedBytes(source.data, source.encoding, headerBytes, source.skip - headerBytes);
     const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     // Looked for piece by piece: std::regex needs a frame of the stack for each character of a repetition.
     const std::regex key("Key=\"(\\d{1,5})\"");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <base/cells.h>
 #include <volume/geometry.h>
 #include <volume/import.h>
 #include <volume/import/header_text.h>
@@ -66,10 +67,7 @@ struct Source {
     std::vector<SegmentName> segments;
     std::vector<std::string> warnings;
 
-    std::uint64_t voxels() const
-    {
-        return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z);
-    }
+    std::uint64_t voxels() const { return base::countOf(size); }
     std::uint64_t elements() const { return voxels() * layers * volumes; }
 };
 

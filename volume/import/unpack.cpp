@@ -281,11 +281,11 @@ std::uint64_t unpackedSize(const std::filesystem::path& file, std::uint64_t offs
     return size;
 }
 
-std::vector<std::byte> unpackedBytes(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding,
-                                     std::uint64_t skip, std::uint64_t count)
+std::vector<std::byte> unpackedBytes(const std::filesystem::path& file, Encoding encoding, std::uint64_t skip,
+                                     std::uint64_t count)
 {
     std::vector<std::byte> out;
-    unpack(file, offset, encoding, [&](std::span<const std::byte> bytes) {
+    unpack(file, 0, encoding, [&](std::span<const std::byte> bytes) {
         const std::uint64_t over = std::min<std::uint64_t>(skip, bytes.size());
         skip -= over;
         const auto rest = bytes.subspan(over);

@@ -25,8 +25,8 @@ void unpack(const std::filesystem::path& file, std::uint64_t offset, Encoding en
 /// `most`.
 std::uint64_t unpackedSize(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding, std::uint64_t most);
 
-/// At most `count` bytes after the first `skip`.
-std::vector<std::byte> unpackedBytes(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding,
-                                     std::uint64_t skip, std::uint64_t count);
+/// At most `count` bytes of a file after the first `skip`, counted after decoding.
+std::vector<std::byte> unpackedBytes(const std::filesystem::path& file, Encoding encoding, std::uint64_t skip,
+                                     std::uint64_t count);
 
 }  // namespace palpate::volume
