@@ -4,6 +4,7 @@
 #include <base/inputs.h>
 #include <base/png.h>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <array>
@@ -31,25 +32,28 @@ glm::dvec3 triple(const json& j)
 json describe(const BeamImage& image, int width, int height)
 {
     const Settings& s = image.settings;
-    return {{"tick", image.tick},
-            {"shape_tick", image.shapeTick},
-            {"probe", image.transducer.shape == ProbeShape::curved ? "curved" : "linear"},
-            {"face_m", triple(image.pose.face)},
-            {"lateral", triple(image.pose.lateral)},
-            {"elevation", triple(image.pose.elevation)},
-            {"axial", triple(image.pose.axial)},
-            {"mirrored", image.mirrored},
-            {"depth_m", s.depth},
-            {"frequency_hz", s.frequency},
-            {"focus_m", s.focus},
-            {"gain_db", s.gain},
-            {"dynamic_range_db", s.dynamicRange},
-            {"tgc_db", s.tgc},
-            {"lines", s.lines},
-            {"samples", s.samples},
-            {"planes", s.planes},
-            {"width", width},
-            {"height", height}};
+    json j{{"tick", image.tick},
+           {"shape_tick", image.shapeTick},
+           {"probe", image.transducer.shape == ProbeShape::curved ? "curved" : "linear"},
+           {"face_m", triple(image.pose.face)},
+           {"lateral", triple(image.pose.lateral)},
+           {"elevation", triple(image.pose.elevation)},
+           {"axial", triple(image.pose.axial)},
+           {"mirrored", image.mirrored},
+           {"depth_m", s.depth},
+           {"frequency_hz", s.frequency},
+           {"focus_m", s.focus},
+           {"gain_db", s.gain},
+           {"dynamic_range_db", s.dynamicRange},
+           {"tgc_db", s.tgc},
+           {"lines", s.lines},
+           {"samples", s.samples},
+           {"planes", s.planes},
+           {"width", width},
+           {"height", height}};
+    if (image.body != 0)
+        j["body"] = fmt::format("{:016x}", image.body);
+    return j;
 }
 
 StoredHow understood(const json& j)
@@ -60,6 +64,8 @@ StoredHow understood(const json& j)
     image.shapeTick = j.at("shape_tick").get<std::uint64_t>();
     image.transducer = j.at("probe").get<std::string>() == "curved" ? curvedProbe() : linearProbe();
     image.pose = {triple(j.at("face_m")), triple(j.at("lateral")), triple(j.at("elevation")), triple(j.at("axial"))};
+    // Pictures of before had no such word.
+    image.body = std::stoull(j.value("body", "0"), nullptr, 16);
     image.mirrored = j.at("mirrored").get<bool>();
     Settings s;
     s.depth = j.at("depth_m").get<float>();
