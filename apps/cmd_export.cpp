@@ -91,6 +91,11 @@ void checkOptions(ExportArguments& o)
     base::checkOutputs({o.output, volume::exportedDataOf(o.output), o.map, o.json}, {o.volume, o.record, o.like});
 }
 
+bool isCtRecord(const std::string& record)
+{
+    return haptics::scanDoseOf(haptics::Record(record).info()) > 0;
+}
+
 // What would change nothing in what is written is a mistake.
 void checkUse(const CLI::App& command, const ExportArguments& o)
 {
@@ -195,8 +200,7 @@ std::string exportState(const ExportArguments& o, const volume::ExportOptions& h
 // A CT scan of a record's body at one moment, as a viewer would show it. Returns what to say of it, as those around.
 std::string exportCt(const ExportArguments& o, const std::function<void(double)>& progress)
 {
-    base::failIf(!(haptics::scanDoseOf(haptics::Record(o.record).info()) > 0),
-                 "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
+    base::failIf(!isCtRecord(o.record), "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
     const session::ShownState shown = session::shownState(o.record, timeFrom(o.at), std::nullopt, progress);
     const haptics::Showing& s = shown.showing;
     channel::Deformation body(s.scenery, s.labels);
@@ -212,6 +216,9 @@ std::string exportCt(const ExportArguments& o, const std::function<void(double)>
 // moment of the stored image `like`, or the session's own.
 std::string exportUltrasound(const ExportArguments& o, const std::function<void(double)>& progress)
 {
+    base::failIf(isCtRecord(o.record),
+                 "{}: its scene is guided by CT and has no ultrasound picture: leave out --what ultrasound and --like",
+                 o.record);
     const auto like = o.like.empty() ? std::nullopt : std::optional(ultrasound::readStored(o.like));
     const double at = like ? static_cast<double>(like->image.tick) / haptics::Record(o.record).info().rate : timeFrom(o.at);
     const session::ShownState shown =
@@ -220,6 +227,10 @@ std::string exportUltrasound(const ExportArguments& o, const std::function<void(
     ultrasound::Scanner scanner(s.scenery, s.labels, s.fine);
     channel::Deformation body(s.scenery, s.labels);
     body.apply(*shown.shape);
+    // Pictures of before do not say of which body they are.
+    const bool told = like && like->image.body != 0;
+    base::failIf(told && like->image.body != scanner.body(), "{}: is a picture of another body than that of {}",
+                 o.like.native(), o.record);
     ultrasound::BeamImage image;
     image.shapeTick = shown.shape->tick;
     image.mirrored = like && like->image.mirrored;
@@ -229,6 +240,7 @@ std::string exportUltrasound(const ExportArguments& o, const std::function<void(
         const auto e = ultrasound::examinationOf(s.scenery, scanner.medium());
         scanner.scan(e.transducer, e.settings, ultrasound::poseAt(e, shown.state), body, shown.state, image);
     }
+    image.body = like && !told ? 0 : image.body;
     base::writeWhole(o.output,
                      ultrasound::storedImage(image, like ? like->width : o.width, like ? like->height : o.height));
     return fmt::format(" at tick {}: {} probe, {:.0f} mm deep", shown.state.tick,
@@ -238,7 +250,11 @@ std::string exportUltrasound(const ExportArguments& o, const std::function<void(
 
 void runExport(const CLI::App& app, ExportArguments o)
 {
+    const bool usual = o.what.empty();
     checkOptions(o);
+    if (usual && o.what == "ultrasound" && o.like.empty() && isCtRecord(o.record)) {
+        o.what = "ct";
+    }
     checkUse(app, o);
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("reading");
@@ -282,7 +298,8 @@ void addExport(CLI::App& app)
     command
         ->add_option("--what", o->what,
                      "Of a volume: labels (default), image, stiffness [kPa]; of a record: labels, displacement (default "
-                     "for .vtu), inverse displacement [mm, LPS], ultrasound (default for .png), ct")
+                     "for .vtu), inverse displacement [mm, LPS], ultrasound and ct (one is the default for .png: as the "
+                     "scene has it)")
         ->check(CLI::IsMember(whatChoices));
     command->add_flag("--nifti2", o->nifti2, "Write NIfTI-2, with positions in double precision");
     command->add_option("--write-map", o->map, "Also write names and tissues as a label map, for import --map")

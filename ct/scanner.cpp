@@ -115,13 +115,50 @@ Scanner::Scanner(const channel::Scenery& scenery, std::span<const std::uint16_t>
 float Scanner::numberAt(const channel::Deformation& body, glm::dvec3 rest) const noexcept
 {
     const channel::Grid& grid = scenery_.labels;
+    const std::uint8_t row = body.restLabel(rest) & channel::rowBits;
     if (!image_.empty()) {
         const glm::dvec3 g = glm::round((rest - vec(grid.origin)) / grid.spacing);
         if (g.x >= 0 && g.y >= 0 && g.z >= 0 && g.x < grid.size[0] && g.y < grid.size[1] && g.z < grid.size[2])
-            return static_cast<float>(scenery_.imageLow +
-                                      scenery_.imageStep * image_[base::offsetOf(channel::sizeOf(grid), glm::ivec3(g))]);
+            return row != 0 ? codeAt(glm::ivec3(g)) : numberBeside(body, glm::ivec3(g));
     }
-    return number_[body.restLabel(rest) & channel::rowBits];
+    return number_[row];
+}
+
+float Scanner::codeAt(glm::ivec3 node) const noexcept
+{
+    const std::size_t at = base::offsetOf(channel::sizeOf(scenery_.labels), node);
+    return static_cast<float>(scenery_.imageLow + scenery_.imageStep * image_[at]);
+}
+
+// Outside the body, where the image goes on (a table, tissue without a label). The nodes next to the body have numbers of
+// tissue instead, so that viewers may interpolate: what is there is taken from behind them.
+float Scanner::numberBeside(const channel::Deformation& body, glm::ivec3 node) const noexcept
+{
+    const glm::ivec3 size = channel::sizeOf(scenery_.labels);
+    const auto isBody = [&](glm::ivec3 n) {
+        return base::holds(size, n) && (body.labels()[base::offsetOf(size, n)] & channel::rowBits) != 0;
+    };
+    glm::vec3 away(0);  // from the tissue around
+    bool beside = false;
+    for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y)
+            for (int x = -1; x <= 1; ++x)
+                if (isBody(node + glm::ivec3(x, y, z))) {
+                    beside = true;
+                    away -= glm::vec3(x, y, z);
+                }
+    const auto outside = [&](glm::ivec3 n) {
+        const float number = codeAt(n);
+        return number > static_cast<float>(scenery_.imageLow) ? number : air;  // code 0: the image ends before
+    };
+    if (!beside)
+        return outside(node);
+    const float length = glm::length(away);
+    if (!(length > 0))
+        return air;
+    constexpr float behind = 3;  // from a node of the body past the next but one
+    const glm::ivec3 there = node + glm::ivec3(glm::round(behind / length * away));
+    return base::holds(size, there) && !isBody(there) ? outside(there) : air;
 }
 
 void Scanner::addPlane(const channel::State& state, const channel::Deformation& body, Plane& plane) const
@@ -221,10 +258,13 @@ std::string scanPng(const Scan& scan, std::uint64_t tick, double doseLength, con
         for (std::size_t y = 0; y < tall; ++y)
             std::copy_n(&one[y * tall], tall, &grey[y * wide + k * tall]);
     }
+    // Of the middle of this picture's first pixel; the corners of both pictures are the same.
+    const double pixel = scan.pixel * scan.side / side;
+    const glm::dvec2 corner = scan.corner + 0.5 * (pixel - scan.pixel);
     const nlohmann::json text{{"tick", tick},
                               {"slice_z_m", scan.height},
-                              {"corner_m", {scan.corner.x, scan.corner.y}},
-                              {"pixel_m", scan.pixel * scan.side / side},
+                              {"corner_m", {corner.x, corner.y}},
+                              {"pixel_m", pixel},
                               {"window_hu", {window.low, window.high}},
                               {"dose_mgy_cm", doseLength}};
     return base::greyPng(static_cast<int>(wide), side, grey, "palpate-ct", text.dump());

@@ -49,7 +49,7 @@ class Scanner {
 public:
     /// @param scenery  with ctSlices over 0
     /// @param image    codes of the intensity image that the body came with; where it is CT its numbers are the tissue's.
-    /// Copied; empty where there is none
+    /// Copied; empty where there is none. The body ends where its labels do
     Scanner(const channel::Scenery& scenery, std::span<const std::uint16_t> image);
 
     /// One scan of this moment, with the needle in it. The middle slice goes through the needle's tip. The same tick gives
@@ -59,6 +59,8 @@ public:
 private:
     struct Plane;
     float numberAt(const channel::Deformation& body, glm::dvec3 rest) const noexcept;
+    float codeAt(glm::ivec3 node) const noexcept;
+    float numberBeside(const channel::Deformation& body, glm::ivec3 node) const noexcept;
     void addPlane(const channel::State& state, const channel::Deformation& body, Plane& plane) const;
     std::vector<float> slice(const channel::State& state, const channel::Deformation& body, const Scan& frame,
                              double height) const;

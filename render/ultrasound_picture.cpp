@@ -61,7 +61,6 @@ void UltrasoundPicture::close()
 
 void UltrasoundPicture::see(const channel::State& state, const channel::Displaced* shape)
 {
-    state_ = state;
     // Also while frozen: a shape that is missed does not come again.
     if (scan_)
         scan_->show(state, shape);
@@ -204,16 +203,16 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
     }
 }
 
-// Where the needle goes from here; before it is inside, the planned line. Only as far as it lies near the picture's plane.
+// Where the needle of this picture goes; before it is inside, the planned line. Only as far as it lies near the picture's
+// plane.
 void UltrasoundPicture::drawGuide(Canvas& canvas, const ultrasound::BeamImage& image) const
 {
-    const bool inside = state_.phase == channel::Phase::inserted && scenery_.tool == channel::ToolKind::needle;
     const glm::dvec3 entry = vec(scenery_.entry), aim = vec(scenery_.aim);
-    if (!inside && entry == aim)
+    if (!image.needled && entry == aim)
         return;
-    const glm::dvec3 from = inside ? vec(state_.tip) : entry;
+    const glm::dvec3 from = image.needled ? image.tip : entry;
     constexpr double reach = 80e-3;  // [m]
-    const glm::dvec3 to = inside ? from + reach * vec(state_.axis) : aim;
+    const glm::dvec3 to = image.needled ? from + reach * image.axis : aim;
     const ultrasound::Pose& p = image.pose;
     const auto local = [&](glm::dvec3 x) {
         const glm::dvec3 d = x - p.face;
@@ -281,7 +280,8 @@ void UltrasoundPicture::levelTgc()
 
 void UltrasoundPicture::toggleFreeze()
 {
-    if (!scan_)
+    // Before the first picture there is nothing to hold.
+    if (!scan_ || (!frozen_ && scan_->latest() == nullptr))
         return;
     frozen_ = !frozen_;
     cine_ = frozen_ ? scan_->cine() : std::deque<ScanThread::Image>();

@@ -81,7 +81,6 @@ private:
     std::unique_ptr<ScanThread> scan_;
     std::string session_;
     channel::Scenery scenery_;
-    channel::State state_;
     std::optional<std::pair<ultrasound::Transducer, ultrasound::Settings>> console_;  // once somebody turned a knob
     ultrasound::ScanConverter converter_;
     ultrasound::Pixels pixels_;

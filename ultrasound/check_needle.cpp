@@ -1,4 +1,5 @@
 #include <ultrasound/check_bodies.h>
+#include <ultrasound/rays.h>
 
 #include <base/units.h>
 
@@ -54,10 +55,10 @@ std::vector<Check> checkNeedle(const SoundOf& soundOf)
     CheckBench bench({clear}, 0.4e-3, [](glm::dvec3) { return 1; });
     bench.physics.speckle = false;
     const double broadside = shaftEcho(bench, 0);
-    // A shaft is narrower than the beam: of three planes only the middle one has its top.
-    const double middle = 1 / (1 + 2 * std::exp(-0.5 * planeReach * planeReach));
-    out.push_back({"shaft across the beams", "dB", broadside, decibels(0.93 * middle), 1.0,
-                   "steel in tissue, R = 0.93, in the middle plane's share of the beam"});
+    constexpr float radius = 1.05e-3F;
+    const auto covered = static_cast<double>(shareBetween(-radius, radius, bench.beam().elevationSigma(14e-3F - radius)));
+    out.push_back({"shaft across the beams", "dB", broadside, decibels(0.93 * covered), 1.0,
+                   "steel in tissue, R = 0.93, of the share of the beam that it covers"});
     for (const double angle : {15.0, 30.0, 45.0, 60.0})
         out.push_back({fmt::format("shaft at {:.0f} degrees to the face, under broadside", angle), "dB",
                        shaftEcho(bench, angle * degree) - broadside, -0.6 * angle, 2.5,

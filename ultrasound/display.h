@@ -15,6 +15,9 @@ struct BeamImage {
     Transducer transducer;
     Settings settings;
     Pose pose;
+    std::uint64_t body = 0;  // tells bodies apart, see Scanner::body(); 0: not known
+    bool needled = false;    // a needle is inside, with its tip [m] and axis:
+    glm::dvec3 tip{0.0}, axis{0, 0, 1};
     bool mirrored = false;           // shown with the marked side at the right
     std::vector<std::uint8_t> grey;  // (samples x lines)
 

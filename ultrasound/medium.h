@@ -23,13 +23,18 @@ inline constexpr std::uint8_t compared = channel::rowBits | holeBit;
 /// A body at rest as sound meets it: tissues and the logarithm of their impedance on a fine grid.
 class Medium {
 public:
-    /// From the fine labels where there are some, else from those of the display, whose borders are smoothed by quadratic
-    /// splines on a grid up to three times as fine.
+    /// From the fine labels where there are some. Where there are none, as beyond the box around the procedure that they
+    /// fill, from those of the display, whose borders are smoothed by quadratic splines on a grid up to three times as
+    /// fine.
     Medium(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint8_t> fine);
 
-    glm::dvec3 origin() const noexcept { return origin_; }
-    double spacing() const noexcept { return spacing_; }
-    glm::ivec3 size() const noexcept { return size_; }
+    glm::dvec3 origin() const noexcept { return layer_.origin; }
+    double spacing() const noexcept { return layer_.spacing; }
+    glm::ivec3 size() const noexcept { return layer_.size; }
+    /// Around all that is known, from `low` to below `high` [voxels from the origin]: 0 and size() where the labels are of
+    /// one kind.
+    glm::ivec3 low() const noexcept { return low_; }
+    glm::ivec3 high() const noexcept { return high_; }
 
     /// Label of the voxel around `v` [voxels from the origin]: tissue row, pureBit, holeBit; `unknown` beyond.
     std::uint8_t label(glm::vec3 v) const noexcept;
@@ -51,28 +56,41 @@ public:
     bool punch(std::span<const channel::Hole> holes, double radius);
 
 private:
-    bool holds(glm::vec3 low, glm::vec3 high) const noexcept;
     static constexpr float codes = 4096;  // of ln Z in steps
 
     struct Saved {
         std::size_t at = 0;
         std::uint8_t label = 0;
     };
+    // A grid of labels, and of the impedances that follow from them.
+    struct Layer {
+        bool holds(glm::vec3 low, glm::vec3 high) const noexcept;
+        std::size_t offset(glm::ivec3 n) const noexcept { return base::offsetOf(size, n); }
 
-    void refine(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
-    void finish(glm::ivec3 low, glm::ivec3 high);
-    std::size_t offset(glm::ivec3 n) const noexcept { return base::offsetOf(size_, n); }
-    void dig(const channel::Hole& hole, double radius, glm::ivec3& low, glm::ivec3& high);
+        glm::dvec3 origin{0.0};
+        double spacing = 1e-3;
+        glm::ivec3 size{0};
+        std::vector<std::uint8_t> labels;
+        std::vector<std::int16_t> lnZ;  // 4096 ln Z [MRayl]
+        std::vector<Saved> saved;       // labels that holes have taken the place of, in the order of the holes
+    };
 
-    glm::dvec3 origin_{0.0};
-    double spacing_ = 1e-3;
-    glm::ivec3 size_{0};
-    std::vector<std::uint8_t> labels_;
-    std::vector<std::int16_t> lnZ_;  // 4096 ln Z [MRayl]
+    std::uint8_t labelAround(glm::vec3 v) const noexcept;
+    static Impedance impedanceIn(const Layer& layer, glm::vec3 v) noexcept;
+    static Layer refined(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, double enough);
+    void surround(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
+    void finish(Layer& layer, glm::ivec3 low, glm::ivec3 high) const;
+    void punch(Layer& layer, double radius) const;
+    static void dig(Layer& layer, const channel::Hole& hole, double radius, glm::ivec3& low, glm::ivec3& high);
+
+    Layer layer_;
+    Layer around_;  // without labels where layer_ has the whole body
+    glm::vec3 toAround_{0};
+    float perVoxel_ = 1;  // of layer_, voxels of around_: v is there toAround_ + perVoxel_ v
+    glm::ivec3 low_{0}, high_{0};
     std::array<channel::TissueSound, 256> sound_{};
     std::array<std::int16_t, 256> code_{};  // of a label's ln Z
     std::vector<channel::Hole> holes_;
-    std::vector<Saved> saved_;  // labels that holes have taken the place of, in the order of the holes
 };
 
 }  // namespace palpate::ultrasound

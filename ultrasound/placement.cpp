@@ -11,6 +11,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 namespace palpate::ultrasound {
 
@@ -18,6 +19,7 @@ namespace {
 
 using units::degree;
 constexpr double step = 0.25e-3;     // of a search for the skin [m]
+constexpr double below = 8e-3;       // that a picture has below the aim, at least [m]
 constexpr double standOff = 0.3e-3;  // gel between face and skin where they are nearest [m]
 
 enum class Place : std::uint8_t { body, air, beyond };
@@ -42,15 +44,31 @@ std::optional<double> wayToAir(const Medium& medium, glm::dvec3 from, glm::dvec3
     return std::nullopt;
 }
 
+constexpr int directions = 200;  // evenly to all sides
+
+glm::dvec3 directionAt(int i)
+{
+    const double z = 1 - (2.0 * i + 1) / directions, r = std::sqrt(1 - z * z), turn = 2.39996323 * i;
+    return {r * std::cos(turn), r * std::sin(turn), z};
+}
+
+// No nearer than this is the skin to a point in the body: a picture that is less deep does not have it.
+double nearestSkin(const Medium& medium, glm::dvec3 from)
+{
+    constexpr double between = 0.95;  // the cosine from the nearest direction that is looked along
+    double nearest = 1;               // [m]
+    for (int i = 0; i < directions; ++i)
+        nearest = std::min(nearest, wayToAir(medium, from, directionAt(i)).value_or(nearest));
+    return between * nearest;
+}
+
 // Out of the body at a point of its surface: the mean direction to the air around.
 glm::dvec3 outward(const Medium& medium, glm::dvec3 p)
 {
-    constexpr int directions = 200;
     constexpr double radius = 8e-3;  // [m]
     glm::dvec3 sum(0);
     for (int i = 0; i < directions; ++i) {
-        const double z = 1 - (2.0 * i + 1) / directions, r = std::sqrt(1 - z * z), turn = 2.39996323 * i;
-        const glm::dvec3 d(r * std::cos(turn), r * std::sin(turn), z);
+        const glm::dvec3 d = directionAt(i);
         if (placeAt(medium, p + radius * d) != Place::body)
             sum += d;
     }
@@ -108,10 +126,10 @@ double scoreOf(const Beam& beam, const Pose& pose, const Line& line, double gap)
         return glm::dvec3(glm::dot(p - pose.face, pose.lateral), 0, glm::dot(p - pose.face, pose.axial));
     };
     const glm::dvec3 aim = local(line.aim);
-    constexpr double margin = 8e-3, least = 6e-3;  // [m]
+    constexpr double least = 6e-3;  // [m]
     const glm::vec2 place = beam.place(static_cast<float>(aim.x), static_cast<float>(aim.z));
     const double side = std::abs(place.x) / (0.5 * (beam.curved() ? beam.transducer().sector : beam.transducer().width));
-    if (place.y < least || place.y > beam.settings().depth - margin || side > 0.8)
+    if (place.y < least || place.y > static_cast<double>(beam.settings().depth) - below || side > 0.8)
         return std::numeric_limits<double>::max();
     // The needle's shaft outside must not go through the probe.
     const double half = beam.curved() ? 30e-3 : 0.5 * beam.transducer().width;
@@ -150,14 +168,25 @@ Line standardLine(const Medium& medium)
     return {middle - t * along, middle - std::max(t - 20e-3, 0.0) * along, along};
 }
 
-}  // namespace
-
-Pose placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::dvec3 aim)
+Line lineOf(const Medium& medium, glm::dvec3 entry, glm::dvec3 aim)
 {
     const bool planned = glm::distance(entry, aim) > 1e-4;
-    const Line line = planned ? Line{entry, aim, glm::normalize(aim - entry)} : standardLine(medium);
+    return planned ? Line{entry, aim, glm::normalize(aim - entry)} : standardLine(medium);
+}
+
+// Across a line.
+glm::dvec3 besideOf(const Line& line)
+{
     const glm::dvec3 helper = std::abs(line.along.z) < 0.8 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
-    const glm::dvec3 a = glm::normalize(glm::cross(line.along, helper)), b = glm::cross(line.along, a);
+    return glm::normalize(glm::cross(line.along, helper));
+}
+
+}  // namespace
+
+std::optional<Pose> placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::dvec3 aim)
+{
+    const Line line = lineOf(medium, entry, aim);
+    const glm::dvec3 a = besideOf(line), b = glm::cross(line.along, a);
     Candidate best;
     constexpr int turns = 24;
     for (int turn = 0; turn < turns; ++turn)
@@ -188,31 +217,18 @@ Pose placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::d
             if (score < best.score)
                 best = {pose, score};
         }
-    if (best.score < std::numeric_limits<double>::max())
-        return best.pose;
-    // Nowhere: along the line, from where it enters.
-    Pose pose = poseOf(line.entry, line.along, a);
-    lay(medium, beam, pose);
-    return pose;
+    return best.score < std::numeric_limits<double>::max() ? std::optional(best.pose) : std::nullopt;
 }
 
-Transducer probeFor(const Medium& medium, glm::dvec3 entry, glm::dvec3 aim)
-{
-    constexpr double deep = 45e-3;  // [m]
-    const bool planned = glm::distance(entry, aim) > 1e-4;
-    const Line line = planned ? Line{entry, aim, glm::normalize(aim - entry)} : standardLine(medium);
-    return glm::distance(line.entry, line.aim) > deep ? curvedProbe() : linearProbe();
-}
+namespace {
 
-Examination examinationOf(const channel::Scenery& scenery, const Medium& medium)
+// What the scene says of the scanner, if anything.
+Examination examinationWith(const Transducer& transducer, const channel::Scenery& scenery)
 {
-    const glm::dvec3 entry = channel::vec(scenery.entry), aim = channel::vec(scenery.aim);
     Examination e;
     e.held = scenery.probe != channel::ProbeKind::none;
-    e.transducer = !e.held                                       ? probeFor(medium, entry, aim)
-                   : scenery.probe == channel::ProbeKind::curved ? curvedProbe()
-                                                                 : linearProbe();
-    e.settings = settingsOf(e.transducer);
+    e.transducer = transducer;
+    e.settings = settingsOf(transducer);
     if (scenery.probeDepth > 0)
         e.settings.depth = static_cast<float>(scenery.probeDepth);
     if (scenery.probeFrequency > 0)
@@ -220,8 +236,38 @@ Examination examinationOf(const channel::Scenery& scenery, const Medium& medium)
     if (scenery.probeFocus > 0)
         e.settings.focus = static_cast<float>(scenery.probeFocus);
     e.settings = within(e.settings, e.transducer);
-    if (!e.held)
-        e.pose = placeProbe(medium, Beam(e.transducer, e.settings), entry, aim);
+    return e;
+}
+
+}  // namespace
+
+Examination examinationOf(const channel::Scenery& scenery, const Medium& medium)
+{
+    if (scenery.probe != channel::ProbeKind::none)
+        return examinationWith(scenery.probe == channel::ProbeKind::curved ? curvedProbe() : linearProbe(), scenery);
+    constexpr double deep = 45e-3;                        // along the line [m]
+    constexpr std::array<float, 2> more{50e-3F, 60e-3F};  // of the linear probe's picture [m]
+    const glm::dvec3 entry = channel::vec(scenery.entry), aim = channel::vec(scenery.aim);
+    const Line line = lineOf(medium, entry, aim);
+    std::vector<Examination> tries{examinationWith(linearProbe(), scenery)};
+    for (const float depth : more) {
+        tries.push_back(tries.front());
+        tries.back().settings.depth = depth;
+    }
+    const bool curvedFirst = glm::distance(line.entry, line.aim) > deep;
+    tries.insert(curvedFirst ? tries.begin() : tries.end(), examinationWith(curvedProbe(), scenery));
+    const double skin = nearestSkin(medium, line.aim);
+    for (Examination& e : tries) {
+        if (skin > static_cast<double>(e.settings.depth) - below)
+            continue;
+        if (const auto pose = placeProbe(medium, Beam(e.transducer, e.settings), entry, aim)) {
+            e.pose = *pose;
+            return e;
+        }
+    }
+    Examination& e = tries.front();
+    e.pose = poseOf(line.entry, line.along, besideOf(line));
+    lay(medium, Beam(e.transducer, e.settings), e.pose);
     return e;
 }
 

@@ -3,16 +3,16 @@
 #include <ultrasound/medium.h>
 #include <ultrasound/transducer.h>
 
+#include <optional>
+
 namespace palpate::ultrasound {
 
 /// A probe on the skin for a needle along the line from `entry` to `aim` [m], in the body at rest: the picture's plane
 /// holds the line, the aim is in the picture, the face lies on the skin beside the needle's way in, and the needle is as
 /// broadside to the beams as the skin allows; the needle comes from the marked side.
 /// Where entry and aim are the same, the line is taken from the middle of the body to its front.
-Pose placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::dvec3 aim);
-
-/// Curved for what lies deeper than a linear probe sees, else linear.
-Transducer probeFor(const Medium& medium, glm::dvec3 entry, glm::dvec3 aim);
+/// Nothing where no such place is.
+std::optional<Pose> placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::dvec3 aim);
 
 /// How an examination of a session begins.
 struct Examination {
@@ -22,6 +22,9 @@ struct Examination {
     bool held = false;  // the scene holds the probe: its pose is that of each tick
 };
 
+/// Where the scene holds no probe: linear, and curved for a line over 45 mm. If the aim is too deep for the linear probe's
+/// picture, that is up to 60 mm deep; if it is still not in it, the other probe. If neither has it, the first one lies
+/// along the line, from where that enters.
 Examination examinationOf(const channel::Scenery& scenery, const Medium& medium);
 
 /// How a probe is moved by hand.

@@ -28,6 +28,12 @@ float needleEcho(float degrees) noexcept
     return 0.93F * std::pow(10.0F, -needleFall * degrees / 20);
 }
 
+float shareBetween(float low, float high, float sigma) noexcept
+{
+    constexpr float halfRoot = 0.70710678F;
+    return 0.5F * (std::erf(halfRoot * high / sigma) - std::erf(halfRoot * low / sigma));
+}
+
 void RayCaster::prepare(const View& view)
 {
     const Beam& beam = view.beam();
@@ -58,6 +64,10 @@ void RayCaster::cast(const View& view, const Needle* needle, const RayOptions& o
     shade.lines = settings.lines;
     shade.steps = static_cast<int>(settings.depth / step_) + 1;
     shade.left.resize(shade.at(shade.planes, 0, 0));
+    needle_.assign(static_cast<std::size_t>(settings.lines), {});
+    for (int i = 0; needle != nullptr && i < settings.lines; ++i)
+        needle_[static_cast<std::size_t>(i)] = meetNeedle(view.beam(), *needle, i);
+    needleRadius_ = needle != nullptr ? needle->radius : 0.0F;
     for (int e = 0; e < settings.planes; ++e) {
         rest_.solve(view, settings.lines, lineStride, (shade.steps - 1) / stride + 2,
                     [&](int line, int row) { return pointAt(view.beam(), line, e, row); });
@@ -66,10 +76,7 @@ void RayCaster::cast(const View& view, const Needle* needle, const RayOptions& o
             ray.line = i;
             ray.plane = e;
             ray.weight = planeWeight_[static_cast<std::size_t>(e)];
-            if (needle != nullptr) {
-                needleRadius_ = needle->radius;
-                meetNeedle(view, *needle, ray);
-            }
+            ray.needle = needle_[static_cast<std::size_t>(i)];
             castLine(view, options, ray, shade, echoes);
         }
     }
@@ -120,10 +127,11 @@ void RayCaster::castLine(const View& view, const RayOptions& options, Ray& ray, 
         } else if ((ray.inside || z > gelGap) && !ray.stopped && (label & pureBit) != 0) {
             stopAtAir(ray, z, echoes);
         }
-        if (ray.needleEcho >= 0 && z >= ray.needleAt)
+        if (ray.needle.echo >= 0 && z >= ray.needle.at)
             echoNeedle(ray, echoes);
-        if (ray.tipAt >= 0 && z >= ray.tipAt)
-            deposit(echoes, ray.line, std::exchange(ray.tipAt, -1.0F), ray.weight * ray.amplitude * tipEcho, 0);
+        if (ray.needle.tipAt >= 0 && z >= ray.needle.tipAt)
+            deposit(echoes, ray.line, std::exchange(ray.needle.tipAt, -1.0F),
+                    ray.weight * ray.amplitude * ray.needle.tipEcho, 0);
         if (options.interfaces && ((label & pureBit) == 0 || ray.crossing.weight > 0))
             cross(medium, v, label, z, ray, echoes);
         ray.last = label;
@@ -193,42 +201,71 @@ void RayCaster::stopAtAir(Ray& ray, float depth, EchoLines& echoes) const
     ray.amplitude = 0;
 }
 
-// The first of the shaft's pieces that the ray hits, and its tip.
-void RayCaster::meetNeedle(const View& view, const Needle& needle, Ray& ray) const
+// Shaft and tip, as far as the beam of a line covers them.
+RayCaster::NeedleHit RayCaster::meetNeedle(const Beam& beam, const Needle& needle, int line) const
 {
-    const Beam& beam = view.beam();
     const std::vector<glm::vec3>& shape = needle.shape;
-    const float l = beam.lineAt(static_cast<float>(ray.line)), r = needle.radius;
-    const glm::vec3 tip = shape.back(), d = beam.direction(l);
-    const float y = beam.plane(ray.plane) * beam.elevationSigma(std::max(tip.z, 0.0F));
-    const glm::vec3 from = beam.point(l, y, 0);
-    ray.needleAt = 1e9F;
+    NeedleHit hit;
     float way = 0;  // from the tip back to the piece
     for (std::size_t i = shape.size() - 1; i > 0; --i) {
-        const glm::vec3 axis = shape[i - 1] - shape[i];
-        const float length = glm::length(axis);
-        if (!(length > 1e-6F))
-            continue;
-        const glm::vec3 u = axis / length, w = from - shape[i];
-        const glm::vec3 dp = d - glm::dot(d, u) * u, wp = w - glm::dot(w, u) * u;
-        const float a = glm::dot(dp, dp), b = glm::dot(wp, dp), c = glm::dot(wp, wp) - r * r, root = b * b - a * c;
-        const float t = root >= 0 && a > 1e-6F ? (-b - std::sqrt(root)) / a : -1;
-        const float along = glm::dot(w + t * d, u);
-        if (t > 0 && along >= 0 && along <= length && t < ray.needleAt) {
-            const float degrees = degree * std::asin(std::min(1.0F, std::abs(glm::dot(d, u))));
-            ray.needleAt = t;
-            ray.needleEcho = needleEcho(degrees);
-            // The point spread dims what is oblique by itself: not twice.
-            ray.needleEcho /= dimmed(beam, t, std::tan(std::min(1.4F, degrees / degree)));
-            if (way + along < tipLength)
-                ray.needleEcho += tipEcho * (1 - (way + along) / tipLength);
-        }
-        way += length;
+        meetPiece(beam, needle, i, way, line, hit);
+        way += glm::length(shape[i - 1] - shape[i]);
     }
-    const glm::vec3 w = from - tip;
-    const float b = glm::dot(w, d), off = glm::dot(w, w) - b * b;
-    if (off < r * r && -b > 0)
-        ray.tipAt = -b;
+    if (hit.echo >= 0) {
+        const float covered = shareBetween(hit.low, hit.high, beam.elevationSigma(hit.at));
+        hit.echo *= covered;
+        hit.behind = 1 - (1 - behindNeedle) * covered;
+    }
+    const float l = beam.lineAt(static_cast<float>(line)), r = needle.radius;
+    const glm::vec3 tip = shape.back(), d = beam.direction(l), w = tip - beam.point(l, tip.y, 0);
+    const float depth = glm::dot(w, d);
+    if (glm::dot(w, w) - depth * depth < r * r && depth > 0) {
+        hit.tipAt = depth;
+        hit.tipEcho = tipEcho * shareBetween(tip.y - r, tip.y + r, beam.elevationSigma(depth));
+    }
+    return hit;
+}
+
+// The part of a piece's middle line within a radius of the plane that line and elevation span. It covers the beam as far
+// as the ellipse reaches that this plane cuts out of the cylinder; the depth is that of its upper side where it is nearest
+// to the picture's plane.
+void RayCaster::meetPiece(const Beam& beam, const Needle& needle, std::size_t piece, float way, int line,
+                          NeedleHit& hit) const
+{
+    const glm::vec3 end = needle.shape[piece], axis = needle.shape[piece - 1] - end;
+    const float length = glm::length(axis), l = beam.lineAt(static_cast<float>(line)), r = needle.radius;
+    if (!(length > 1e-6F))
+        return;
+    const glm::vec3 d = beam.direction(l), u = axis / length, across(d.z, 0, -d.x);
+    const float off = glm::dot(end - beam.point(l, 0, 0), across), slope = glm::dot(u, across);
+    float first = 0, last = length;  // along the piece
+    if (std::abs(slope) > 1e-6F) {
+        first = std::clamp((-off - std::copysign(r, slope)) / slope, 0.0F, length);
+        last = std::clamp((-off + std::copysign(r, slope)) / slope, 0.0F, length);
+    }
+    if (std::abs(off + slope * first) > 1.001F * r && std::abs(off + slope * last) > 1.001F * r)
+        return;
+    const float a = end.y + u.y * first, b = end.y + u.y * last, middle = 0.5F * (a + b);
+    const float reach = std::hypot(r, 0.5F * (b - a)), nearest = std::clamp(0.0F, std::min(a, b), std::max(a, b));
+    hit.low = std::min(hit.low, middle - reach);
+    hit.high = std::max(hit.high, middle + reach);
+    const glm::vec3 w = beam.point(l, nearest, 0) - end;
+    const glm::vec3 dp = d - glm::dot(d, u) * u, wp = w - glm::dot(w, u) * u;
+    const float square = glm::dot(dp, dp), half = glm::dot(wp, dp),
+                root = half * half - square * (glm::dot(wp, wp) - r * r);
+    const float t = root >= 0 && square > 1e-6F ? (-half - std::sqrt(root)) / square : -1;
+    const float along = glm::dot(w + t * d, u);
+    constexpr float alike = 0.1e-3F;  // off the plane [m]: then the upper one
+    const float further = std::abs(nearest) - hit.off;
+    if (t <= 0 || along < 0 || along > length || further > alike || (further > -alike && t >= hit.at))
+        return;
+    const float degrees = degree * std::asin(std::min(1.0F, std::abs(glm::dot(d, u))));
+    hit.at = t;
+    hit.off = std::abs(nearest);
+    // The point spread dims what is oblique by itself: not twice.
+    hit.echo = needleEcho(degrees) / dimmed(beam, t, std::tan(std::min(1.4F, degrees / degree)));
+    if (way + along < tipLength)
+        hit.echo += tipEcho * (1 - (way + along) / tipLength);
 }
 
 // What the point spread leaves of the peak of a line of echoes that goes down by `slope` metres a metre.
@@ -252,16 +289,16 @@ void RayCaster::echoNeedle(Ray& ray, EchoLines& echoes) const
     constexpr int repeats = 9;
     constexpr float first = 0.25F, kept = 0.6F;
     const float gap = 2 * needleRadius_ * soundSpeed / steel;  // between the walls, as it looks
-    float a = ray.weight * ray.amplitude * ray.needleEcho;
-    deposit(echoes, ray.line, ray.needleAt, a, 0);
+    float a = ray.weight * ray.amplitude * ray.needle.echo;
+    deposit(echoes, ray.line, ray.needle.at, a, 0);
     a *= first;
     for (int m = 1; m <= repeats; ++m, a *= kept) {
         const auto third = static_cast<std::uint32_t>(ray.line / 3), again = static_cast<std::uint32_t>(m);
         const float uneven = 0.7F + 0.6F * static_cast<float>(scrambled(third + 97 * again) & 255U) / 255;
-        deposit(echoes, ray.line, ray.needleAt + static_cast<float>(m) * gap, a * uneven, 0);
+        deposit(echoes, ray.line, ray.needle.at + static_cast<float>(m) * gap, a * uneven, 0);
     }
-    ray.behind = behindNeedle;
-    ray.needleEcho = -1;
+    ray.behind = ray.needle.behind;
+    ray.needle.echo = -1;
 }
 
 // A shadow fills up with depth, for the aperture looks around an obstacle.

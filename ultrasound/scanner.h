@@ -48,6 +48,8 @@ public:
 
     void setPhysics(const Physics& physics);
     const Medium& medium() const noexcept { return medium_; }
+    /// Tells bodies apart: a hash of the labels at rest, of where they lie and of what their tissues do to sound. Never 0.
+    std::uint64_t body() const noexcept { return body_; }
     std::size_t blocks() const noexcept { return scatterers_.blocks(); }
     /// CPU time of each stage of the last picture [s].
     const std::array<double, stageCount>& seconds() const noexcept { return seconds_; }
@@ -57,6 +59,7 @@ private:
 
     channel::Scenery scenery_;
     Medium medium_;
+    std::uint64_t body_ = 0;
     Physics physics_;
     RayCaster rays_;
     Scatterers scatterers_;

@@ -17,6 +17,9 @@ namespace {
 constexpr std::size_t patterns = 256;
 constexpr float reach = 2.1F;  // across the picture's plane [sigmas]
 constexpr float millimetre = 1e3F;
+constexpr int brickSide = 8;  // [blocks]
+constexpr std::size_t perBrick = std::size_t{brickSide} * brickSide * brickSide;
+constexpr std::size_t mostBricks = 4096;  // 78 MB; a picture has a hundred or a few
 
 float uniform(std::uint32_t& state) noexcept
 {
@@ -93,14 +96,19 @@ void Scatterers::prepare(const View& view, const Medium& medium)
 {
     const Beam& beam = view.beam();
     const float edge = beam.transducer().block;
-    if (edge != edge_ || block_.empty()) {
+    if (edge != edge_) {
         edge_ = edge;
         voxelsPerBlock_ = edge / static_cast<float>(medium.spacing());
-        size_ = glm::ivec3(glm::vec3(medium.size()) / voxelsPerBlock_) + 1;
-        const std::size_t count = base::countOf(size_);
-        stamp_.assign(count, pass_);
-        known_.assign(count, Known::no);
-        block_.resize(count);
+        first_ = glm::ivec3(glm::floor(glm::vec3(medium.low()) / voxelsPerBlock_));
+        size_ = glm::ivec3(glm::vec3(medium.high()) / voxelsPerBlock_) + 1 - first_;
+        bricks_ = (size_ + (brickSide - 1)) / brickSide;
+        brickAt_.clear();
+    }
+    if (brickAt_.empty() || block_.size() > mostBricks * perBrick) {
+        brickAt_.assign(base::countOf(bricks_), 0);
+        stamp_.clear();
+        known_.clear();
+        block_.clear();
     }
     const float density = perBlock / (edge * edge * edge);
     constexpr float rootPi = 1.7724539F;
@@ -157,27 +165,54 @@ void Scatterers::findAlong(const View& view, glm::vec3 first, int looks)
         const glm::vec3 p = pointAt(i);
         if (!nearPicture(view.beam(), p.x, p.z))
             continue;
-        const glm::ivec3 n(glm::floor(perBlockVoxel * rest_.voxel(view, p, i, 0)));
+        const glm::ivec3 n = glm::ivec3(glm::floor(perBlockVoxel * rest_.voxel(view, p, i, 0))) - first_;
         if (!base::holds(size_, n))
             continue;
-        const auto id = static_cast<std::uint32_t>(base::offsetOf(size_, n));
-        if (stamp_[id] == pass_)
+        const std::uint32_t kept = keptAt(n);
+        if (stamp_[kept] == pass_)
             continue;
-        stamp_[id] = pass_;
-        chosen_.push_back(id);
+        stamp_[kept] = pass_;
+        chosen_.push_back({static_cast<std::uint32_t>(base::offsetOf(size_, n)), kept});
     }
 }
 
-// What each scatterer of a block sends back: its tissue, and the variation within that; once a block.
-void Scatterers::fill(std::uint32_t id, glm::vec3 corner, const Medium& medium)
+// Where a block of the body is kept; makes its brick.
+std::uint32_t Scatterers::keptAt(glm::ivec3 n)
 {
-    const Pattern& q = patterns_[scrambled(id) % patterns];
+    std::uint32_t& brick = brickAt_[base::offsetOf(bricks_, n / brickSide)];
+    if (brick == 0) {
+        const std::size_t count = block_.size() + perBrick;
+        stamp_.resize(count, pass_ - 1);
+        known_.resize(count, Known::no);
+        block_.resize(count);
+        brick = static_cast<std::uint32_t>(count / perBrick);
+    }
+    const auto inside = static_cast<std::uint32_t>(base::offsetOf(glm::ivec3(brickSide), n % brickSide));
+    return (brick - 1) * static_cast<std::uint32_t>(perBrick) + inside;
+}
+
+// [voxels]
+glm::vec3 Scatterers::cornerOf(std::uint32_t id) const
+{
+    return voxelsPerBlock_ * glm::vec3(base::cellOf(size_, id) + first_);
+}
+
+std::size_t Scatterers::memory() const noexcept
+{
+    return sizeof(std::uint32_t) * (brickAt_.capacity() + stamp_.capacity()) + sizeof(Known) * known_.capacity() +
+           sizeof(Block) * block_.capacity();
+}
+
+// What each scatterer of a block sends back: its tissue, and the variation within that; once a block.
+void Scatterers::fill(const Chosen& chosen, glm::vec3 corner, const Medium& medium)
+{
+    const Pattern& q = patterns_[scrambled(chosen.id) % patterns];
     const float perVoxel = millimetre * static_cast<float>(medium.spacing());
     bool any = false;
     for (std::size_t j = 0; j < perBlock; ++j) {
         const glm::vec3 v = corner + voxelsPerBlock_ * (glm::vec3(q.x[j], q.y[j], q.z[j]) + 0.5F);
         const std::uint8_t label = medium.label(v);
-        std::uint8_t& strength = block_[id].strength[j];
+        std::uint8_t& strength = block_[chosen.kept].strength[j];
         strength = 0;
         if ((label & compared) == 0 || label == unknown)
             continue;
@@ -190,7 +225,7 @@ void Scatterers::fill(std::uint32_t id, glm::vec3 corner, const Medium& medium)
             any = true;
         }
     }
-    known_[id] = any ? Known::some : Known::nothing;
+    known_[chosen.kept] = any ? Known::some : Known::nothing;
 }
 
 // Moves a block: its middle by u, its inside by F.
@@ -295,21 +330,22 @@ void Scatterers::splat(const View& view, const Shade& shade, EchoLines& echoes)
     const Kernels& k = kernels();
     sum_.clear(echoes.lines, echoes.samples);
     BlockEchoes at;
-    for (const std::uint32_t id : chosen_) {
-        if (known_[id] == Known::nothing)
+    for (const Chosen& chosen : chosen_) {
+        Known& known = known_[chosen.kept];
+        if (known == Known::nothing)
             continue;
-        const glm::vec3 corner = voxelsPerBlock_ * glm::vec3(base::cellOf(size_, id));
-        if (known_[id] == Known::no)
-            fill(id, corner, view.medium());
-        if (known_[id] == Known::nothing)
+        const glm::vec3 corner = cornerOf(chosen.id);
+        if (known == Known::no)
+            fill(chosen, corner, view.medium());
+        if (known == Known::nothing)
             continue;
         float depth = 0, off = 0;
-        place(view, corner, patterns_[scrambled(id) % patterns], at, depth, off);
+        place(view, corner, patterns_[scrambled(chosen.id) % patterns], at, depth, off);
         const BlockScale scale = scaleAt(view, depth);
         if (std::abs(off) > scale.cut + edge_)
             continue;
         k.echoes(scale, at);
-        add(view, shade, block_[id], at);
+        add(view, shade, block_[chosen.kept], at);
     }
     sum_.addTo(echoes);
 }

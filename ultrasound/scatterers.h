@@ -39,6 +39,8 @@ public:
     void splatPoint(const View& view, const Shade& shade, glm::vec3 at, float level, EchoLines& echoes);
 
     std::size_t blocks() const noexcept { return chosen_.size(); }
+    /// Of the cache, which goes with what pictures have shown up to a limit [bytes].
+    std::size_t memory() const noexcept;
 
 private:
     struct Pattern {
@@ -60,11 +62,17 @@ private:
         std::vector<float> complex;  // (samples x lines x 2)
     };
     enum class Known : std::uint8_t { no, some, nothing };
+    // A block in the picture: which one of the body's, and where it is kept.
+    struct Chosen {
+        std::uint32_t id = 0, kept = 0;
+    };
 
     void prepare(const View& view, const Medium& medium);
     bool nearPicture(const Beam& beam, float l, float z) const;
     void findAlong(const View& view, glm::vec3 first, int looks);
-    void fill(std::uint32_t id, glm::vec3 corner, const Medium& medium);
+    std::uint32_t keptAt(glm::ivec3 n);
+    glm::vec3 cornerOf(std::uint32_t id) const;
+    void fill(const Chosen& chosen, glm::vec3 corner, const Medium& medium);
     void place(const View& view, glm::vec3 corner, const Pattern& pattern, BlockEchoes& out, float& depth,
                float& off) const;
     void add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at);
@@ -74,12 +82,16 @@ private:
     std::array<float, 256> level_{};  // amplitude of a strength
     std::vector<float> norm_;         // by sample: makes the rms of fat's speckle what it is to be
     float variation_ = 1;
-    glm::ivec3 size_{0};                   // in blocks
+    glm::ivec3 first_{0}, size_{0};        // of the body, in blocks
     float edge_ = 0, voxelsPerBlock_ = 0;  // [m], [voxels]
-    std::vector<std::uint32_t> stamp_;     // by block: the last pass that chose it
+    // Blocks are kept in bricks of 8 x 8 x 8, which are made when one of theirs comes into a picture, so that memory goes
+    // with the picture and not with the body.
+    glm::ivec3 bricks_{0};                // of the body
+    std::vector<std::uint32_t> brickAt_;  // by brick of the body: 1 + its place among those that are made; 0: not made
+    std::vector<std::uint32_t> stamp_;    // by kept block: the last pass that chose it
     std::vector<Known> known_;
     std::vector<Block> block_;
-    std::vector<std::uint32_t> chosen_;
+    std::vector<Chosen> chosen_;
     RestShifts rest_;  // of a row of looks
     Sum sum_;
     std::uint32_t pass_ = 0;

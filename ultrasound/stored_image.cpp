@@ -5,6 +5,7 @@
 #include <base/png.h>
 #include <base/vec_json.h>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <array>
@@ -21,25 +22,28 @@ constexpr std::string_view keyword = "palpate";
 json describe(const BeamImage& image, int width, int height)
 {
     const Settings& s = image.settings;
-    return {{"tick", image.tick},
-            {"shape_tick", image.shapeTick},
-            {"probe", image.transducer.shape == ProbeShape::curved ? "curved" : "linear"},
-            {"face_m", image.pose.face},
-            {"lateral", image.pose.lateral},
-            {"elevation", image.pose.elevation},
-            {"axial", image.pose.axial},
-            {"mirrored", image.mirrored},
-            {"depth_m", s.depth},
-            {"frequency_hz", s.frequency},
-            {"focus_m", s.focus},
-            {"gain_db", s.gain},
-            {"dynamic_range_db", s.dynamicRange},
-            {"tgc_db", s.tgc},
-            {"lines", s.lines},
-            {"samples", s.samples},
-            {"planes", s.planes},
-            {"width", width},
-            {"height", height}};
+    json j{{"tick", image.tick},
+           {"shape_tick", image.shapeTick},
+           {"probe", image.transducer.shape == ProbeShape::curved ? "curved" : "linear"},
+           {"face_m", image.pose.face},
+           {"lateral", image.pose.lateral},
+           {"elevation", image.pose.elevation},
+           {"axial", image.pose.axial},
+           {"mirrored", image.mirrored},
+           {"depth_m", s.depth},
+           {"frequency_hz", s.frequency},
+           {"focus_m", s.focus},
+           {"gain_db", s.gain},
+           {"dynamic_range_db", s.dynamicRange},
+           {"tgc_db", s.tgc},
+           {"lines", s.lines},
+           {"samples", s.samples},
+           {"planes", s.planes},
+           {"width", width},
+           {"height", height}};
+    if (image.body != 0)
+        j["body"] = fmt::format("{:016x}", image.body);
+    return j;
 }
 
 StoredHow understood(const json& j)
@@ -51,6 +55,8 @@ StoredHow understood(const json& j)
     image.transducer = j.at("probe").get<std::string>() == "curved" ? curvedProbe() : linearProbe();
     image.pose = {j.at("face_m").get<glm::dvec3>(), j.at("lateral").get<glm::dvec3>(), j.at("elevation").get<glm::dvec3>(),
                   j.at("axial").get<glm::dvec3>()};
+    // Pictures of before had no such word.
+    image.body = std::stoull(j.value("body", "0"), nullptr, 16);
     image.mirrored = j.at("mirrored").get<bool>();
     Settings s;
     s.depth = j.at("depth_m").get<float>();

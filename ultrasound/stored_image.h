@@ -7,8 +7,8 @@
 
 namespace palpate::ultrasound {
 
-/// The picture of a BeamImage as a file: 8-bit grey PNG with scale and marks, and in its text "palpate" tick, pose, probe
-/// and settings as JSON.
+/// The picture of a BeamImage as a file: 8-bit grey PNG with scale and marks, and in its text "palpate" tick, pose, probe,
+/// settings and body as JSON.
 std::string storedImage(const BeamImage& image, int width, int height);
 
 /// What a stored image says of how it was made; `grey` is empty.

@@ -10,6 +10,21 @@
 namespace palpate::apps {
 namespace {
 
+// A scene with CT has no ultrasound picture: a picture of its record is a scan.
+TEST(CtRecord, APictureOfItIsAScan)
+{
+    const Folder folder;
+    const std::string record = folder / "c.db";
+    figures({"train", "ct-core-biopsy", "--setting", "fast", "--model", "spring", "--unpaced", "--no-view", "--seconds",
+             "0.2", "--record", record});
+    const Outcome outcome =
+        palpate({"export", "--record", record, "--at", "0.1s", "--window", "lung", "-o", folder / "a.png"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_NE(base::textInPng(readText(folder / "a.png"), "palpate-ct"), "");
+    expectRefusal({"export", "--record", record, "--at", "0.1s", "--what", "ultrasound", "-o", folder / "b.png"},
+                  "is guided by CT and has no ultrasound picture");
+}
+
 // A scripted trainee's scans and their dose are in the score, and a record gives the scan of any moment, the same twice.
 TEST(CtRecord, ATraineeScansAndTheRecordGivesTheScansAgain)
 {

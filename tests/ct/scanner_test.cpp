@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -209,6 +210,57 @@ TEST(CtScan, ABodyThatCameWithCtHasItsNumbers)
     EXPECT_NEAR(sampleOf(Scanner(cube.s, image).scan(cube.state, body), 1, 0, 0, 20e-3).mean, 300, 3);
     std::strcpy(cube.s.imageUnit.data(), "");
     EXPECT_NEAR(sampleOf(Scanner(cube.s, image).scan(cube.state, body), 1, 30e-3, 0, 10e-3).mean, base::ctNumberOf(911), 3);
+}
+
+// The image of a body goes on by a voxel of tissue beside it, for viewers to interpolate; the scanned body ends where its
+// labels do. What the image has further outside is there: a bar without a label, 10 mm wide and 10 mm beside the body.
+TEST(CtScan, ABodyWithCtIsAsLargeAsItsLabels)
+{
+    Cube cube;
+    std::strcpy(cube.s.imageUnit.data(), "HU");
+    cube.s.windows = 1;
+    cube.s.imageLow = -1024;
+    cube.s.imageStep = 1;
+    cube.s.ctDoseIndex = 1e6;
+    cube.s.lattice = {{61, 61, 61}, 0, {-60e-3, -60e-3, -60e-3}, 2e-3};
+    const auto centre = [](int i) { return i - 59.5; };  // [mm]
+    std::vector<std::uint16_t> image;
+    for (int z = 0; z < Cube::side; ++z)
+        for (int y = 0; y < Cube::side; ++y)
+            for (int x = 0; x < Cube::side; ++x) {
+                const double far = std::max({std::abs(centre(x)), std::abs(centre(y)), std::abs(centre(z))});
+                // The body is smaller by 10 mm to each side than its cube.
+                auto& label = cube.labels[static_cast<std::size_t>((z * Cube::side + y) * Cube::side + x)];
+                label = far < 40 ? 1 : 0;
+                image.push_back(far < 41 ? 1064 : centre(x) > 50 ? 1124 : 24);
+            }
+    channel::Deformation body(cube.s, cube.labels);
+    const Scan scan = Scanner(cube.s, image).scan(cube.state, body);
+    const int middle = scan.side / 2;
+    int wide = 0, high = 0;
+    for (int i = 0; i < scan.side; ++i) {
+        wide += scan.at(1, i, middle) > -480 && scan.corner.x + i * scan.pixel < 45e-3 ? 1 : 0;
+        high += scan.at(1, middle, i) > -480 ? 1 : 0;
+    }
+    EXPECT_NEAR(wide * scan.pixel, 80e-3, 0.5e-3);
+    EXPECT_NEAR(high * scan.pixel, 80e-3, 0.5e-3);
+    EXPECT_NEAR(sampleOf(scan, 1, 0, 0, 20e-3).mean, 40, 1);
+    EXPECT_NEAR(sampleOf(scan, 1, 55e-3, 0, 2e-3).mean, 100, 1);
+    EXPECT_NEAR(sampleOf(scan, 1, 45e-3, 0, 2e-3).mean, -1000, 1);
+}
+
+// Its first pixel begins where the scan's does, whatever its size.
+TEST(CtScan, APictureSaysWhereItLies)
+{
+    Cube cube;
+    const Scan scan = cube.scan();
+    for (const int side : {100, 320, 1000}) {
+        const auto text = nlohmann::json::parse(base::textInPng(scanPng(scan, 7, 7.5, windows[0], side), "palpate-ct"));
+        const double pixel = text.at("pixel_m").get<double>();
+        EXPECT_NEAR(pixel * side, scan.pixel * scan.side, 1e-12);
+        EXPECT_NEAR(text.at("corner_m").at(0).get<double>() - 0.5 * pixel, scan.corner.x - 0.5 * scan.pixel, 1e-12);
+        EXPECT_NEAR(text.at("corner_m").at(1).get<double>() - 0.5 * pixel, scan.corner.y - 0.5 * scan.pixel, 1e-12);
+    }
 }
 
 TEST(CtScan, AWindowGoesFromBlackToWhite)

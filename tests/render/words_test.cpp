@@ -118,6 +118,42 @@ TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
     studio->resize(width, height);
 }
 
+// A frozen picture has the line of the needle that is in it, while the needle goes on. Before there is a picture there is
+// nothing to freeze.
+TEST_F(WordsTest, AFrozenUltrasoundPictureKeepsTheLineOfItsNeedle)
+{
+    Picture& picture = studio->picture();
+    picture.showUltrasound(true);
+    picture.open(studio->scenery, studio->labels, "story");
+    picture.showUltrasound(true);
+    picture.ultrasound().toggleFreeze();
+    EXPECT_FALSE(picture.ultrasound().frozen());
+    const auto line = [](const Image& image) {
+        std::vector<std::pair<int, int>> out;
+        for (int y = 0; y < image.high; ++y)
+            for (int x = 0; x < image.wide; ++x)
+                if (near(image.at(x, y), {77, 242, 102}, 30))
+                    out.emplace_back(x, y);
+        return out;
+    };
+    const auto at = [&](double t) {
+        picture.update(storyState(studio->scenery, t), nullptr, {30, 0.02, 1000});
+        picture.render(Quality::still);
+        return line(studio->grab("guide"));
+    };
+    studio->take(2.2, Layout::trainee, true);
+    picture.showUltrasound(true);
+    const auto first = at(2.2), later = at(3.3);
+    EXPECT_GT(first.size(), 20U);
+    EXPECT_NE(later, first);
+    at(2.2);
+    picture.ultrasound().toggleFreeze();
+    ASSERT_TRUE(picture.ultrasound().frozen());
+    EXPECT_EQ(at(3.3), first);
+    picture.ultrasound().toggleFreeze();
+    picture.showUltrasound(false);
+}
+
 // In every window and with everything that there may be to say: words lie inside the window and on no other words.
 TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
 {

@@ -21,6 +21,7 @@ BeamImage example()
     image.settings.tgc = {1, -2, 3.25F, 0, 0, 0, 0, 0.1F};
     image.settings.gain = -3.3F;
     image.pose = poseOf({0.1, 1.0 / 3, -0.2}, {0.1, 0.9, 0.2}, {1, 0, 0.3});
+    image.body = 0xfedcba9876543210;
     image.mirrored = true;
     image.grey.resize(static_cast<std::size_t>(image.settings.lines) * static_cast<std::size_t>(image.settings.samples));
     for (std::size_t i = 0; i < image.grey.size(); ++i)
@@ -40,6 +41,7 @@ TEST(StoredImage, SaysHowItWasMade)
     EXPECT_EQ(how.height, 480);
     EXPECT_EQ(how.image.tick, image.tick);
     EXPECT_EQ(how.image.shapeTick, image.shapeTick);
+    EXPECT_EQ(how.image.body, image.body);
     EXPECT_EQ(how.image.settings, image.settings);
     EXPECT_EQ(how.image.pose.face, image.pose.face);
     EXPECT_EQ(how.image.pose.axial, image.pose.axial);
@@ -48,6 +50,17 @@ TEST(StoredImage, SaysHowItWasMade)
     EXPECT_EQ(how.image.mirrored, image.mirrored);
     EXPECT_EQ(how.image.transducer.shape, ProbeShape::curved);
     EXPECT_EQ(storedImage(image, 640, 480), storedImage(image, 640, 480));
+}
+
+// As those of before.
+TEST(StoredImage, NeedNotSayOfWhichBodyItIs)
+{
+    const tests::Folder folder;
+    BeamImage image = example();
+    image.body = 0;
+    const auto file = folder.path() / "us.png";
+    base::writeWhole(file, storedImage(image, 64, 48));
+    EXPECT_EQ(readStored(file).image.body, 0U);
 }
 
 TEST(StoredImage, RefusesWhatIsNoneOfOurs)
