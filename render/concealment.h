@@ -1,7 +1,7 @@
 #pragma once
 
 #include <channel/layout.h>
-#include <render/traces.h>
+#include <render/history.h>
 
 #include <cstdint>
 #include <span>

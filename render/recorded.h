@@ -2,8 +2,8 @@
 
 #include <channel/layout.h>
 #include <render/events.h>
+#include <render/history.h>
 #include <render/tip_way.h>
-#include <render/traces.h>
 
 #include <cstdint>
 #include <deque>
