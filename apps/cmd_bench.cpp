@@ -3,6 +3,7 @@
 #include <command/options.h>
 
 #include <base/outputs.h>
+#include <base/vec_json.h>
 #include <planner/costs.h>
 #include <session/figures.h>
 #include <session/open.h>
@@ -37,10 +38,9 @@ nlohmann::json caseFigures(int side, const haptics::SessionModel& model, const s
     for (std::size_t i = 0; i < haptics::taskCount; ++i) {
         tasks[std::string(name(static_cast<haptics::Task>(i)))] = session::microseconds(c.contactTasks[i].percentiles());
     }
-    const auto size = model.tissue->size();
-    return {{"voxels_per_side", side},    {"size", {size.x, size.y, size.z}}, {"lattice_nodes", model.lattice.grid.count()},
-            {"ticks", c.contact.count()}, {"tick_us_p50", 1e6 * tick.p50},    {"tick_us_p99", 1e6 * tick.p99},
-            {"tasks_us", tasks},          {"moved_nodes", c.meanMoved},       {"all", session::timingFigures(c.all)}};
+    return {{"voxels_per_side", side},    {"size", model.tissue->size()},  {"lattice_nodes", model.lattice.grid.count()},
+            {"ticks", c.contact.count()}, {"tick_us_p50", 1e6 * tick.p50}, {"tick_us_p99", 1e6 * tick.p99},
+            {"tasks_us", tasks},          {"moved_nodes", c.meanMoved},    {"all", session::timingFigures(c.all)}};
 }
 
 void printCase(int side, const studies::TickCase& c)

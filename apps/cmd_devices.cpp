@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/end_in_order.h>
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
 #include <command/interrupted.h>
@@ -30,7 +31,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -65,12 +65,6 @@ struct Exchanges {
     std::vector<double> roundTrip;  // of those answered [s], sorted
     bool loaded = false;
 };
-
-std::string textOf(const fs::path& file)
-{
-    std::ifstream stream(file);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 // The rule in this folder; where it is udev's own and there is none, the one that a package brought.
 fs::path ruleIn(const fs::path& folder)
@@ -248,7 +242,7 @@ nlohmann::json list(const DevicesArguments& o)
         say("no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
     }
     const fs::path rule = ruleIn(o.rules);
-    const bool there = textOf(rule) == falcon::udevRule();
+    const bool there = base::contentOf(rule).value_or("") == falcon::udevRule();
     say(fmt::format("udev rule         {}",
                     there ? rule.string() : "not there: 'sudo palpate devices --install-udev' writes it"));
     nlohmann::json all{{"falcons", figures}, {"udev_rule", {{"file", rule.string()}, {"installed", there}}}};

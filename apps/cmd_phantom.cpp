@@ -4,6 +4,7 @@
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <base/split.h>
+#include <base/vec_json.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <datasets/phantom.h>
@@ -62,16 +63,14 @@ void applySetting(datasets::PhantomSpec& spec, const std::string& setting)
 
 nlohmann::json figures(const volume::Tissue& tissue, double seconds)
 {
-    const Index3 size = tissue.size();
-    const Vec3 spacing = tissue.affine().spacing() * 1e3;
     const volume::MemoryUse memory = tissue.memory();
     const auto labels = base::mapped<nlohmann::json>(tissue.structures(), [&](const auto& s) -> nlohmann::json {
         const std::string& name = tissue.table().rows[s.tissue].name;
         return {
             {"value", s.value}, {"name", s.name}, {"tissue", name}, {"voxels", s.voxels}, {"volume_ml", s.volume * 1e6}};
     });
-    return {{"size", {size.x, size.y, size.z}},
-            {"spacing_mm", {spacing.x, spacing.y, spacing.z}},
+    return {{"size", tissue.size()},
+            {"spacing_mm", tissue.affine().spacing() * 1e3},
             {"labels", labels},
             {"memory_mb", static_cast<double>(memory.label + memory.stiffness + memory.occupancy) * 1e-6},
             {"seconds", seconds}};

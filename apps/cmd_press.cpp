@@ -5,6 +5,7 @@
 
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/vec_json.h>
 #include <command/progress.h>
 #include <session/open.h>
 #include <studies/press/press.h>
@@ -90,17 +91,12 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
     return tool;
 }
 
-json millimetres(Vec3 v)
-{
-    return {1e3 * v.x, 1e3 * v.y, 1e3 * v.z};
-}
-
 json sampleFigures(const PressSample& s)
 {
     return {{"seconds", s.pose.seconds},
-            {"position_mm", millimetres(s.pose.position)},
-            {"axis", {s.pose.axis.x, s.pose.axis.y, s.pose.axis.z}},
-            {"force_n", {s.force.x, s.force.y, s.force.z}},
+            {"position_mm", 1e3 * s.pose.position},
+            {"axis", s.pose.axis},
+            {"force_n", s.force},
             {"contact_mm2", 1e6 * s.contactArea},
             {"energy_mj", 1e3 * s.energy},
             {"residual", s.residual},
@@ -148,7 +144,7 @@ json pressFigures(const PressArguments& o, const Run& run)
              {"displacement", json::array()}};
     for (std::size_t i = 0; i < run.points.size(); ++i) {
         out["displacement"].push_back(
-            {{"at_mm", millimetres(run.points[i].at)}, {"by_mm", millimetres(run.samples.back().displacement[i])}});
+            {{"at_mm", 1e3 * run.points[i].at}, {"by_mm", 1e3 * run.samples.back().displacement[i]}});
     }
     return out;
 }

@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/vec_json.h>
 #include <command/interrupted.h>
 #include <command/json.h>
 #include <reference/ccx.h>
@@ -147,12 +148,11 @@ std::string numbered(const std::string& file, std::size_t look)
 
 json lookFigures(const reference::Solver& solver, const studies::ReferenceState& state, const studies::TrialPath& path)
 {
-    const Vec3 at = 1e3 * path.at(state.pose);
     return {{"pressed_mm", 1e3 * state.pose.pressed},
             {"depth_mm", 1e3 * (state.pose.pressed - path.gap)},
-            {"position_mm", {at.x, at.y, at.z}},
+            {"position_mm", 1e3 * path.at(state.pose)},
             {"dragged_mm", 1e3 * state.pose.dragged},
-            {"force_n", {state.force.x, state.force.y, state.force.z}},
+            {"force_n", state.force},
             {"energy_j", state.energy},
             {"strain", state.strain},
             {"largest_mm", 1e3 * state.largest},

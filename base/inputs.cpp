@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <fstream>
 #include <iterator>
 #include <system_error>
+#include <utility>
 
 namespace palpate::base {
 
@@ -36,6 +38,17 @@ std::string whyNoFile(const std::filesystem::path& file)
     return std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))
                ? "is a symbolic link to a file that is not there: check where it leads"
                : "there is no such file: check the name";
+}
+
+std::optional<std::string> contentOf(const std::filesystem::path& file)
+{
+    try {
+        std::ifstream in(file, std::ios::binary);
+        std::string bytes{std::istreambuf_iterator<char>(in), {}};
+        return in.is_open() ? std::optional(std::move(bytes)) : std::nullopt;
+    } catch (const std::ios_base::failure&) {  // of the standard library's buffer, where reading fails
+        return std::nullopt;
+    }
 }
 
 std::vector<std::filesystem::path> filesWith(const std::string& ending, const std::filesystem::path& folder)

@@ -12,8 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <optional>
 
 namespace palpate::datasets {
 
@@ -93,12 +92,9 @@ toml::table parseToml(std::string_view text, const std::string& file)
 std::string readText(const std::filesystem::path& file)
 {
     base::checkTable(file, "a settings file");
-
-    std::ifstream in(file, std::ios::binary);
-    std::ostringstream text;
-    text << in.rdbuf();
-    base::failIf(!in, "{}: cannot be read: check its permissions", file.native());
-    return text.str();
+    std::optional<std::string> text = base::contentOf(file);
+    base::failIf(!text, "{}: cannot be read: check its permissions", file.native());
+    return *std::move(text);
 }
 
 Section::Section(const toml::table& table, std::string file, std::string title)

@@ -1,6 +1,7 @@
 #include <report/report.h>
 
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/png.h>
@@ -19,7 +20,6 @@
 #include <cmath>
 #include <exception>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <string>
@@ -269,8 +269,7 @@ std::string picturesCard(const std::filesystem::path& folder)
     }
     std::string out = "<section class=\"card\"><h2>Pictures</h2><div class=\"pictures\">";
     for (const SessionPicture& picture : pictures) {
-        std::ifstream in(picture.file, std::ios::binary);
-        const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+        const std::string bytes = base::contentOf(picture.file).value_or("");
         const std::string words = escape(picture.words);
         out += "<figure><img alt=\"" + words + "\" src=\"data:image/png;base64," + base64(bytes) + "\"><figcaption>" +
                words + "</figcaption></figure>";

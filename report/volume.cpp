@@ -1,5 +1,6 @@
 #include <report/volume.h>
 
+#include <base/vec_json.h>
 #include <volume/provenance.h>
 
 #include <fmt/format.h>
@@ -56,8 +57,7 @@ nlohmann::json supportFigures(const volume::Tissue& tissue)
     if (!tissue.support()) {
         return nullptr;
     }
-    const Vec3 p = 1e3 * tissue.support()->point, n = tissue.support()->normal;
-    return {{"point_mm", {p.x, p.y, p.z}}, {"normal", {n.x, n.y, n.z}}};
+    return {{"point_mm", 1e3 * tissue.support()->point}, {"normal", tissue.support()->normal}};
 }
 
 void printStructures(const volume::Tissue& tissue)
@@ -125,10 +125,10 @@ nlohmann::json volumeFigures(const volume::Tissue& tissue)
         }
     }
     const volume::MemoryUse use = tissue.memory();
-    return {{"size", {size.x, size.y, size.z}},
-            {"spacing_mm", {spacing.x, spacing.y, spacing.z}},
+    return {{"size", size},
+            {"spacing_mm", spacing},
             {"direction", directions},
-            {"origin_mm", {origin.x, origin.y, origin.z}},
+            {"origin_mm", origin},
             {"labels", labels},
             {"memory_mb", megabytes(use.label + use.stiffness + use.occupancy + use.image)},
             {"grids_mb",

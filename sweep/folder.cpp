@@ -1,7 +1,9 @@
 #include <sweep/folder.h>
 
 #include <base/error.h>
+#include <base/inputs.h>
 #include <base/outputs.h>
+#include <base/process.h>
 #include <datasets/scene_text.h>
 #include <volume/fnv.h>
 
@@ -17,6 +19,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 
@@ -32,10 +35,9 @@ constexpr const char* unfinished = ".part";
 
 std::string textOf(const fs::path& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    std::string text((std::istreambuf_iterator<char>(in)), {});
-    base::failIf(!in && text.empty(), "{}: cannot be read: check its name and permissions", file.native());
-    return text;
+    std::optional<std::string> text = base::contentOf(file);
+    base::failIf(!text, "{}: cannot be read: check its name and permissions", file.native());
+    return *std::move(text);
 }
 
 std::string hashOf(const std::string& bytes)
@@ -246,7 +248,7 @@ void SweepFolder::write(const SweepRow& row) const
     std::error_code failed;
     fs::create_directories(file.parent_path(), failed);
     // Named after the process: two may write the same row, and either is whole.
-    const fs::path half = file.parent_path() / fmt::format("{}.{}.{}{}", row.index, machineName(), getpid(), unfinished);
+    const fs::path half = file.parent_path() / fmt::format("{}.{}.{}{}", row.index, base::hostName(), getpid(), unfinished);
     std::ofstream out(half, std::ios::binary);
     out << lineOf(entry) << '\n';
     out.close();
@@ -294,7 +296,7 @@ SweepRow runCase(CaseRunner& runner, const SweepFolder& folder, std::size_t inde
     SweepRow row;
     row.index = index;
     row.build = build;
-    row.machine = machineName();
+    row.machine = base::hostName();
     const double before = cpuSeconds();
     try {
         auto result = runner.run(index, folder.plan().records ? folder.record(index) : fs::path());

@@ -1,6 +1,7 @@
 #include <sweep/lock.h>
 
 #include <base/error.h>
+#include <base/process.h>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -8,7 +9,6 @@
 
 #include <unistd.h>
 
-#include <array>
 #include <ctime>
 #include <fstream>
 #include <random>
@@ -47,17 +47,10 @@ base::FileLock lockOf(const fs::path& folder)
 
 }  // namespace
 
-std::string machineName()
-{
-    std::array<char, 256> name{};
-    gethostname(name.data(), name.size() - 1);
-    return name.data();
-}
-
 FolderLock::FolderLock(fs::path folder) : folder_(std::move(folder)), id_(newId()), lock_(lockOf(folder_))
 {
     const json own{{"id", id_},
-                   {"machine", machineName()},
+                   {"machine", base::hostName()},
                    {"process", static_cast<long>(getpid())},
                    {"since", fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::localtime(std::time(nullptr)))}};
     lock_.write(own.dump() + "\n");

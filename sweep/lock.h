@@ -29,7 +29,4 @@ private:
     base::FileLock lock_;
 };
 
-/// Name of this machine.
-std::string machineName();
-
 }  // namespace palpate::sweep

@@ -1,6 +1,7 @@
 #include <sweep/pool.h>
 
 #include <base/error.h>
+#include <base/process.h>
 #include <sweep/lock.h>
 
 #include <fmt/format.h>
@@ -224,7 +225,7 @@ PoolResult runLocally(SweepFolder& folder, const std::vector<std::size_t>& cases
         SweepRow row;
         row.index = cases[item];
         row.build = build;
-        row.machine = machineName();
+        row.machine = base::hostName();
         row.error = fmt::format("its process was ended by signal {} ({})", signal, strsignal(signal));
         folder.write(row);
     };

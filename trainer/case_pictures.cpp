@@ -1,18 +1,17 @@
 #include <trainer/case_pictures.h>
 
+#include <base/inputs.h>
+
 #define STBI_ONLY_PNG
 #include <stb/stb_image.h>
 
 #include <cstddef>
-#include <fstream>
-#include <iterator>
 
 namespace palpate::trainer {
 
 Pixels casePicture(const std::string& picture)
 {
-    std::ifstream file(picture, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+    const std::string bytes = base::contentOf(picture).value_or("");
     Pixels pixels;
     int channels = 0;
     constexpr std::size_t most = 64U << 20U;  // [bytes]

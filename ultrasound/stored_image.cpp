@@ -3,12 +3,12 @@
 #include <base/error.h>
 #include <base/inputs.h>
 #include <base/png.h>
+#include <base/vec_json.h>
 
 #include <nlohmann/json.hpp>
 
 #include <array>
-#include <fstream>
-#include <iterator>
+#include <optional>
 
 namespace palpate::ultrasound {
 
@@ -18,26 +18,16 @@ using nlohmann::json;
 
 constexpr std::string_view keyword = "palpate";
 
-json triple(glm::dvec3 v)
-{
-    return {v.x, v.y, v.z};
-}
-
-glm::dvec3 triple(const json& j)
-{
-    return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
-}
-
 json describe(const BeamImage& image, int width, int height)
 {
     const Settings& s = image.settings;
     return {{"tick", image.tick},
             {"shape_tick", image.shapeTick},
             {"probe", image.transducer.shape == ProbeShape::curved ? "curved" : "linear"},
-            {"face_m", triple(image.pose.face)},
-            {"lateral", triple(image.pose.lateral)},
-            {"elevation", triple(image.pose.elevation)},
-            {"axial", triple(image.pose.axial)},
+            {"face_m", image.pose.face},
+            {"lateral", image.pose.lateral},
+            {"elevation", image.pose.elevation},
+            {"axial", image.pose.axial},
             {"mirrored", image.mirrored},
             {"depth_m", s.depth},
             {"frequency_hz", s.frequency},
@@ -59,7 +49,8 @@ StoredHow understood(const json& j)
     image.tick = j.at("tick").get<std::uint64_t>();
     image.shapeTick = j.at("shape_tick").get<std::uint64_t>();
     image.transducer = j.at("probe").get<std::string>() == "curved" ? curvedProbe() : linearProbe();
-    image.pose = {triple(j.at("face_m")), triple(j.at("lateral")), triple(j.at("elevation")), triple(j.at("axial"))};
+    image.pose = {j.at("face_m").get<glm::dvec3>(), j.at("lateral").get<glm::dvec3>(), j.at("elevation").get<glm::dvec3>(),
+                  j.at("axial").get<glm::dvec3>()};
     image.mirrored = j.at("mirrored").get<bool>();
     Settings s;
     s.depth = j.at("depth_m").get<float>();
@@ -93,10 +84,9 @@ StoredHow readStored(const std::filesystem::path& file)
 {
     const std::string why = base::whyNoFile(file);
     base::failIf(!why.empty(), "{}: {}", file.native(), why);
-    std::ifstream in(file, std::ios::binary);
-    const std::string png((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-    base::failIf(!in, "{}: cannot be read", file.native());
-    const std::string text = base::textInPng(png, keyword);
+    const std::optional<std::string> png = base::contentOf(file);
+    base::failIf(!png, "{}: cannot be read", file.native());
+    const std::string text = base::textInPng(*png, keyword);
     base::failIf(text.empty(), "{}: is no ultrasound image that palpate has stored", file.native());
     try {
         return understood(json::parse(text));

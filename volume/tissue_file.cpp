@@ -2,9 +2,11 @@
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
+#include <base/cells.h>
 #include <base/error.h>
 #include <base/inputs.h>
 #include <base/outputs.h>
+#include <base/vec_json.h>
 
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
@@ -33,24 +35,6 @@ void initialise()
 {
     static std::once_flag once;
     std::call_once(once, [] { openvdb::initialize(); });
-}
-
-json triple(const Vec3& v)
-{
-    return json::array({v.x, v.y, v.z});
-}
-json triple(const Index3& v)
-{
-    return json::array({v.x, v.y, v.z});
-}
-
-Vec3 vec3(const json& j)
-{
-    return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
-}
-Index3 index3(const json& j)
-{
-    return {j.at(0).get<int>(), j.at(1).get<int>(), j.at(2).get<int>()};
 }
 
 json toJson(const Acoustics& a)
@@ -163,8 +147,8 @@ json describe(const TissueData& t)
                               {"name", s.name},
                               {"tissue", t.table.rows[s.tissue].name},
                               {"voxels", s.voxels},
-                              {"low", triple(t.extents[i].low)},
-                              {"high", triple(t.extents[i].high)}});
+                              {"low", t.extents[i].low},
+                              {"high", t.extents[i].high}});
         if (s.colour) {
             structures.back()["colour"] = *s.colour;
         }
@@ -173,9 +157,9 @@ json describe(const TissueData& t)
         }
     }
     json out{{"format", t.stiffnessMap.points.empty() ? 1 : formatVersion},
-             {"size", triple(t.size)},
-             {"steps_m", {triple(t.affine.linear[0]), triple(t.affine.linear[1]), triple(t.affine.linear[2])}},
-             {"origin_m", triple(t.affine.origin)},
+             {"size", t.size},
+             {"steps_m", {t.affine.linear[0], t.affine.linear[1], t.affine.linear[2]}},
+             {"origin_m", t.affine.origin},
              {"table", {{"name", t.table.name}, {"rows", rows}}},
              {"structures", structures},
              {"provenance", t.provenance}};
@@ -203,7 +187,7 @@ void readStructures(const json& list, TissueData& t)
             t.structures.back().colour = j.at("colour").get<std::array<std::uint8_t, 3>>();
         }
         t.structures.back().terminology = j.value("terminology", "");
-        t.extents.push_back({index3(j.at("low")), index3(j.at("high"))});
+        t.extents.push_back({j.at("low").get<Index3>(), j.at("high").get<Index3>()});
     }
 }
 
@@ -212,10 +196,10 @@ void readDescription(const json& j, TissueData& t)
     const int version = j.at("format").get<int>();
     base::failIf(version > formatVersion, "format {} is newer than this program reads ({}): use a newer palpate", version,
                  formatVersion);
-    t.size = index3(j.at("size"));
+    t.size = j.at("size").get<Index3>();
     const json& steps = j.at("steps_m");
-    t.affine.linear = Mat3(vec3(steps.at(0)), vec3(steps.at(1)), vec3(steps.at(2)));
-    t.affine.origin = vec3(j.at("origin_m"));
+    t.affine.linear = Mat3(steps.at(0).get<Vec3>(), steps.at(1).get<Vec3>(), steps.at(2).get<Vec3>());
+    t.affine.origin = j.at("origin_m").get<Vec3>();
     t.table.name = j.at("table").at("name").get<std::string>();
     t.table.rows = base::mapped<TissueRow>(j.at("table").at("rows"), rowFrom);
     t.provenance = j.at("provenance").get<Provenance>();
@@ -294,9 +278,8 @@ void checkCounts(const TissueData& t)
         nonzero += s.value != 0 ? s.voxels : 0;
         solid += t.lookup.solid[s.value] != 0 ? s.voxels : 0;
     }
-    const auto count =
-        static_cast<std::uint64_t>(t.size.x) * static_cast<std::uint64_t>(t.size.y) * static_cast<std::uint64_t>(t.size.z);
-    base::failIf(described != count || nonzero != t.label->activeVoxelCount() || solid != t.occupancy->activeVoxelCount(),
+    base::failIf(described != base::countOf(t.size) || nonzero != t.label->activeVoxelCount() ||
+                     solid != t.occupancy->activeVoxelCount(),
                  "its voxels do not add up to what its table says: it is damaged, make it again");
 }
 

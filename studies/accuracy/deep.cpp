@@ -3,6 +3,7 @@
 #include <base/build.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/vec_json.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <report/chart/chart.h>
@@ -125,11 +126,6 @@ constexpr std::array<std::pair<const char*, const char*>, 5> zones{
     {{"faint", "a < h/2"}, {"touch", "a h/2..1.5h"}, {"middle", "to 1 R"}, {"deep", "to 1.5 R"}, {"deepest", "to 2 R"}}};
 constexpr std::size_t quickPlaces = 2;
 
-json vectorOf(Vec3 v)
-{
-    return {v.x, v.y, v.z};
-}
-
 const char* nameOf(DeepZone zone)
 {
     return zones.at(static_cast<std::size_t>(zone)).first;
@@ -147,8 +143,8 @@ json entryOf(const DeepCase& what, const std::string& setting, double spacing, c
             {"depth_radii", look.depth / what.tool.radius},
             {"contact_cells", std::sqrt(what.tool.radius * look.depth) / spacing},
             {"zone", nameOf(zoneOf(look.depth, what.tool.radius, spacing))},
-            {"force_n", vectorOf(look.force)},
-            {"reference_n", vectorOf(look.reference)},
+            {"force_n", look.force},
+            {"reference_n", look.reference},
             {"reference_edges_mm", 1e3 * look.edges},
             {"error_pct", look.errorPercent()},
             {"direction_deg", look.directionDegrees()}};

@@ -2,8 +2,10 @@
 
 #include <base/error.h>
 #include <base/folds.h>
+#include <base/inputs.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/vec_json.h>
 #include <volume/fnv.h>
 
 #include <fmt/format.h>
@@ -16,8 +18,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <fstream>
 #include <iterator>
+#include <optional>
 #include <type_traits>
 #include <vector>
 
@@ -73,16 +75,6 @@ std::vector<Word> unpacked(const json& binary, std::size_t count)
     return words;
 }
 
-json vectorJson(Vec3 v)
-{
-    return {v.x, v.y, v.z};
-}
-
-Vec3 vectorOf(const json& v)
-{
-    return {v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
-}
-
 json positionJson(const std::vector<Vec3f>& position)
 {
     std::vector<std::uint32_t> bits;
@@ -116,8 +108,8 @@ json stateJson(const ReferenceState& s)
     }
     return {{"pressed", s.pose.pressed},
             {"dragged", s.pose.dragged},
-            {"focus", vectorJson(s.focus)},
-            {"force", vectorJson(s.force)},
+            {"focus", s.focus},
+            {"force", s.force},
             {"energy", s.energy},
             {"largest", s.largest},
             {"strain", s.strain},
@@ -131,8 +123,8 @@ ReferenceState stateOf(const json& in, std::size_t count)
 {
     ReferenceState s;
     s.pose = {in.at("pressed").get<double>(), in.at("dragged").get<double>()};
-    s.focus = vectorOf(in.at("focus"));
-    s.force = vectorOf(in.at("force"));
+    s.focus = in.at("focus").get<Vec3>();
+    s.force = in.at("force").get<Vec3>();
     s.energy = in.at("energy").get<double>();
     s.largest = in.at("largest").get<double>();
     s.strain = in.at("strain").get<double>();
@@ -152,9 +144,9 @@ json infoJson(const ReferenceInfo& i)
     json out = i;
     if (i.press) {
         out["body"] = i.body;
-        out["press"] = {{"start", vectorJson(i.press->start)},
-                        {"inward", vectorJson(i.press->inward)},
-                        {"sideways", vectorJson(i.press->sideways)},
+        out["press"] = {{"start", i.press->start},
+                        {"inward", i.press->inward},
+                        {"sideways", i.press->sideways},
                         {"press", i.press->press}};
     }
     return out;
@@ -165,7 +157,7 @@ ReferenceInfo infoOf(const json& in)
     auto i = in.get<ReferenceInfo>();
     if (const auto press = in.find("press"); press != in.end()) {
         i.body = in.at("body").get<std::string>();
-        i.press = {vectorOf(press->at("start")), vectorOf(press->at("inward")), vectorOf(press->at("sideways")),
+        i.press = {press->at("start").get<Vec3>(), press->at("inward").get<Vec3>(), press->at("sideways").get<Vec3>(),
                    press->at("press").get<double>()};
     }
     return i;
@@ -277,12 +269,10 @@ void saveReference(const std::filesystem::path& file, const Reference& reference
 
 std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    base::failIf(!in || std::filesystem::is_directory(file), "{}: cannot be read: check its name and its permissions",
-                 file.native());
-    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    const std::optional<std::string> bytes = base::contentOf(file);
+    base::failIf(!bytes, "{}: cannot be read: check its name and its permissions", file.native());
     try {
-        return parsed(bytes);
+        return parsed(*bytes);
     } catch (const std::exception& e) {
         throw base::error("{}: is no reference that can be used ({}): make it anew with palpate-reference --save",
                           file.string(), e.what());

@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/split.h>
+#include <base/vec_json.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -40,11 +41,6 @@ constexpr double rivalTick = 1e-3;  // of schedule() [s]
 constexpr double density = 1e3;     // of all tissue, for what has inertia [kg/m^3]
 constexpr double largest = 1e6;     // of any number of an answer, in SI: beyond, a solver has run away
 
-json listOf(Vec3 v)
-{
-    return {v.x, v.y, v.z};
-}
-
 // The tissues' elastic constants, each once, and which of them each tetrahedron has.
 void addMaterials(json& push, const TetBody& mesh)
 {
@@ -67,7 +63,7 @@ void addMesh(json& push, const TetBody& mesh)
 {
     json points = json::array(), held = json::array();
     for (std::size_t p = 0; p < mesh.points.size(); ++p) {
-        points.push_back(listOf(mesh.points[p]));
+        points.push_back(mesh.points[p]);
         if (mesh.held[p] != 0) {
             held.push_back(p);
         }
@@ -85,7 +81,7 @@ void addPath(json& push, const AccuracySubject& subject)
         if (t.look) {
             looks.push_back(centres.size());
         }
-        centres.push_back(listOf(subject.path.at(t.pose)));
+        centres.push_back(subject.path.at(t.pose));
     }
     push["tool"] = {{"kind", "sphere"}, {"radius_m", subject.path.tool.radius}, {"friction", 0.0}};
     push["tick_s"] = rivalTick;

@@ -1,5 +1,7 @@
 #include <tests/apps/program.h>
 
+#include <base/inputs.h>
+
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
@@ -13,7 +15,6 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <thread>
@@ -184,8 +185,7 @@ void expectRefusal(const std::vector<std::string>& arguments, const std::string&
 
 std::string readText(const std::filesystem::path& file)
 {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
+    return base::contentOf(file).value_or("");
 }
 
 void writeText(const std::filesystem::path& file, const std::string& text)

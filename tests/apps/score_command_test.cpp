@@ -1,5 +1,6 @@
 
 #include <apps/command.h>
+#include <base/inputs.h>
 #include <haptics/score.h>
 
 #include <tests/error_of.h>
@@ -110,8 +111,7 @@ TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
     const auto f = readJson(folder / "f.json");
     EXPECT_NEAR(f["groups"][0]["lower_quartile"]["deepest_mm"].get<double>(), 15, 1e-9);
     EXPECT_NEAR(f["groups"][0]["upper_quartile"]["deepest_mm"].get<double>(), 40, 1e-9);
-    std::ifstream in(folder / "f.html");
-    const std::string page((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    const std::string page = base::contentOf(folder / "f.html").value();
     EXPECT_NE(page.find("20.0 (15.0 to 40.0)"), std::string::npos);
     EXPECT_NE(page.find("-0.33"), std::string::npos);
     EXPECT_EQ(f["sessions"].size(), 5U);
@@ -122,12 +122,6 @@ TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
     EXPECT_EQ(f["effect_size"]["kind"], "cliffs_delta");
     EXPECT_NEAR(f["effect_size"]["deepest_mm"].get<double>(), -1.0 / 3, 1e-12);
     EXPECT_EQ(f["effect_size"]["peak_force_n"], 0);
-}
-
-std::string fileText(const std::filesystem::path& file)
-{
-    std::ifstream in(file);
-    return {std::istreambuf_iterator<char>(in), {}};
 }
 
 // Nobody fired, and the scene has neither probe nor CT: no figure is made of what was not measured.
@@ -144,7 +138,7 @@ TEST(ScoreCommand, GroupsWithoutAValueHaveNoEffectSize)
         EXPECT_TRUE(f["groups"][0]["median"][key].is_null()) << key;
     }
     EXPECT_EQ(f["effect_size"]["deepest_mm"], -1);
-    for (const std::string& shown : {text, fileText(folder / "f.html")}) {
+    for (const std::string& shown : {text, base::contentOf(folder / "f.html").value()}) {
         EXPECT_EQ(shown.find("- (- to -)"), std::string::npos) << shown;
     }
     EXPECT_EQ(text.find("probe s"), std::string::npos) << text;
@@ -159,7 +153,7 @@ TEST(ScoreCommand, OneSessionIsNoGroup)
                                     "--report", (folder / "f.html").string()});
     EXPECT_TRUE(readJson(folder / "f.json")["effect_size"]["deepest_mm"].is_null());
     EXPECT_EQ(text.find("+1.00") + text.find("-1.00"), 2 * std::string::npos) << text;
-    EXPECT_NE(fileText(folder / "f.html").find("over old: -"), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "f.html").value().find("over old: -"), std::string::npos);
 }
 
 // 20.01 and 20.02 mm are both printed as 20.0.
@@ -171,7 +165,7 @@ TEST(ScoreCommand, ValuesThatArePrintedTheSameAreTies)
     score({"--group", "new=" + a + "," + b, "--group", "old=" + c + "," + d, "--json", (folder / "f.json").string(),
            "--report", (folder / "f.html").string()});
     EXPECT_EQ(readJson(folder / "f.json")["effect_size"]["deepest_mm"], 0);
-    const std::string page = fileText(folder / "f.html");
+    const std::string page = base::contentOf(folder / "f.html").value();
     EXPECT_NE(page.find("Deepest insertion [mm] 20.0"), std::string::npos) << "it is the same in all sessions";
     EXPECT_EQ(page.find("aria-label=\"Deepest insertion\""), std::string::npos);
 }

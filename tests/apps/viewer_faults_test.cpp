@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <channel/channel.h>
 #include <tests/apps/desktop.h>
 
@@ -10,7 +11,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <random>
 #include <sstream>
@@ -101,8 +101,7 @@ std::optional<pid_t> childCalled(const std::string& name, pid_t parent)
         const std::string id = entry.path().filename();
         if (id.find_first_not_of("0123456789") != std::string::npos)
             continue;
-        std::ifstream file(entry.path() / "stat");
-        std::string text((std::istreambuf_iterator<char>(file)), {});
+        const std::string text = base::contentOf(entry.path() / "stat").value_or("");
         const std::size_t close = text.rfind(')');
         if (close == std::string::npos || text.find("(" + name + ")") == std::string::npos)
             continue;

@@ -1,5 +1,6 @@
 #include <base/outputs.h>
 
+#include <base/inputs.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -10,7 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <string>
@@ -21,12 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string contentOf(const std::string& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-
 // A pipe or a device (/dev/null) takes the bytes and stays what it is; put in its place, a file would end it for everybody.
 TEST(Outputs, APipeIsWrittenIntoAndStaysAPipe)
 {
@@ -34,7 +28,7 @@ TEST(Outputs, APipeIsWrittenIntoAndStaysAPipe)
     const std::string pipe = folder / "pipe";
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
     std::string read;
-    std::thread reader([&] { read = contentOf(pipe); });
+    std::thread reader([&] { read = base::contentOf(pipe).value(); });
     writeWhole(pipe, "a,b\n1,2\n");
     reader.join();
     EXPECT_EQ(read, "a,b\n1,2\n");
@@ -52,10 +46,10 @@ TEST(Outputs, ALinkStaysALink)
     fs::create_symlink(file, link);
     writeWhole(link, "new");
     EXPECT_TRUE(fs::is_symlink(link));
-    EXPECT_EQ(contentOf(file), "new");
+    EXPECT_EQ(base::contentOf(file).value(), "new");
     EXPECT_EQ(replaceable(link), fs::canonical(file));
     writeWhole(fresh, "first");
-    EXPECT_EQ(contentOf(fresh), "first");
+    EXPECT_EQ(base::contentOf(fresh).value(), "first");
     EXPECT_EQ(replaceable(fresh), fresh);
     EXPECT_THROW(writeWhole(folder / "none/of.csv", "x"), std::runtime_error);
 }

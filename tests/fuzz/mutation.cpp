@@ -1,5 +1,6 @@
 #include "mutation.h"
 
+#include <base/inputs.h>
 #include <volume/import.h>
 
 #include <algorithm>
@@ -13,12 +14,6 @@ namespace palpate::fuzz {
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string contents(const fs::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::size_t below(std::size_t n, std::mt19937& random)
 {
@@ -156,11 +151,11 @@ Outcome tryOne(const Seed& seed, std::mt19937& random, const fs::path& folder)
     const fs::path copy = folder / seed.file.filename();
     for (const fs::path& companion : seed.companions) {
         // Now and then the fault is in the data instead of the header.
-        const std::string bytes = contents(companion);
+        const std::string bytes = base::contentOf(companion).value();
         std::ofstream(folder / companion.filename(), std::ios::binary)
             << (random() % 4 == 0 ? mutated(bytes, random) : bytes);
     }
-    std::ofstream(copy, std::ios::binary) << mutated(contents(seed.file), random);
+    std::ofstream(copy, std::ios::binary) << mutated(base::contentOf(seed.file).value(), random);
     Outcome outcome;
     importInto(outcome, [&] { volume::importLabels(copy); });
     importInto(outcome, [&] { volume::importImage(copy); });

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <haptics/record_check.h>
 #include <haptics/replay.h>
 #include <haptics/simulation.h>
@@ -46,16 +47,10 @@ void recordSession(const std::filesystem::path& file)
     recorder.finish({{"force_hash", fmt::format("{:016x}", hash.value())}});
 }
 
-std::string bytesOf(const std::filesystem::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 // Bytes set, bits turned, a piece copied over another, the end cut off.
 void mutateBytes(const std::filesystem::path& file, std::mt19937_64& random)
 {
-    std::string bytes = bytesOf(file);
+    std::string bytes = base::contentOf(file).value();
     for (auto n = 1 + random() % 4; n > 0; --n) {
         const std::size_t at = random() % (random() % 4 == 0 ? std::min<std::size_t>(bytes.size(), 200) : bytes.size());
         switch (random() % 8) {

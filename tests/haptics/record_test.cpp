@@ -1,5 +1,6 @@
 #include <haptics/recorder.h>
 
+#include <base/inputs.h>
 #include <tests/allocations.h>
 #include <tests/error_of.h>
 #include <tests/haptics/synthetic_session.h>
@@ -470,8 +471,7 @@ TEST(Record, DamagedFilesNeverCrash)
     const synthetic::Folder folder;
     const auto whole = folder / "whole";
     synthetic::record(whole, synthetic::info(), synthetic::procedure(1, 1, 1));
-    std::ifstream in(whole, std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    const std::string bytes = base::contentOf(whole).value();
     std::mt19937 random(3);
     for (int round = 0; round < 60; ++round) {
         std::string changed = bytes;

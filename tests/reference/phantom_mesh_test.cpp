@@ -1,4 +1,5 @@
 // Meshes of phantoms: quality, volumes, and what other programs make of the files.
+#include <base/inputs.h>
 #include <datasets/phantom.h>
 #include <datasets/scene.h>
 #include <datasets/tables.h>
@@ -135,8 +136,7 @@ TEST(VolumeMesh, OfAPairIsGoodAndOpensElsewhere)
     const auto log = folder.path() / "log";
     const std::string command = "gmsh " + written("m.msh").string() + " -check > " + log.string() + " 2>&1";
     ASSERT_EQ(std::system(command.c_str()), 0) << "gmsh: scripts/install-packages --test installs it";
-    std::ifstream in(log);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::string text = base::contentOf(log).value();
     EXPECT_NE(text.find(std::to_string(made.mesh.points.size()) + " nodes"), std::string::npos) << text;
     EXPECT_EQ(text.find("Error"), std::string::npos) << text;
     EXPECT_EQ(text.find("Warning"), std::string::npos) << text;

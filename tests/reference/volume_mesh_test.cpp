@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <datasets/tables.h>
 #include <reference/box_mesh.h>
 #include <reference/ccx.h>
@@ -392,8 +393,7 @@ TEST_F(MeshFiles, GmshReadsItsKind)
     const auto log = folder_.path() / "log";
     const std::string command = "gmsh " + written("m.msh").string() + " -check > " + log.string() + " 2>&1";
     ASSERT_EQ(std::system(command.c_str()), 0) << "gmsh: scripts/install-packages --test installs it";
-    std::ifstream in(log);
-    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::string text = base::contentOf(log).value();
     EXPECT_NE(text.find("343 nodes"), std::string::npos) << text;
     EXPECT_NE(text.find("1776 elements"), std::string::npos) << text;  // 1296 tetrahedra, 480 facets
     EXPECT_EQ(text.find("Error"), std::string::npos) << text;

@@ -1,12 +1,12 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <base/inputs.h>
 #include <render/controls.h>
 #include <render/keys.h>
 
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <set>
 #include <sstream>
 #include <string>
@@ -52,14 +52,12 @@ TEST(Keys, NoneShowsAnUltrasoundPictureWhereTheSceneHasCt)
 // The page has what `palpate-view --keys` prints, and so each key of the list.
 TEST(Keys, ThePageHasAllOfThem)
 {
-    std::ifstream in(PALPATE_SOURCE_DIR "/docs/viewer.md");
-    std::ostringstream page;
-    page << in.rdbuf();
+    const std::string page = base::contentOf(PALPATE_SOURCE_DIR "/docs/viewer.md").value();
     std::string block, line;
     for (std::istringstream words(keysInWords()); std::getline(words, line);) {
         block += (line.empty() ? "" : "    ") + line + "\n";
     }
-    EXPECT_NE(page.str().find(block), std::string::npos) << "put this into docs/viewer.md:\n" << block;
+    EXPECT_NE(page.find(block), std::string::npos) << "put this into docs/viewer.md:\n" << block;
     for (const Controls::Key& key : Controls::keys) {
         EXPECT_NE(block.find(key.what), std::string::npos) << key.shown;
     }

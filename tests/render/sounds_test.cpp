@@ -1,5 +1,6 @@
 #include <render/sounds.h>
 
+#include <base/inputs.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -51,10 +52,7 @@ TEST(Sounds, AreHeardOnceWhenAWarningBecomesMoreUrgent)
     std::ofstream(config) << "pcm.!default { type file slave.pcm null file \"" << heard << "\" format raw }\n"
                           << "pcm.null { type null }\n";
     ::setenv("ALSA_CONFIG_PATH", config.c_str(), 1);
-    const auto bytes = [&] {
-        std::ifstream in(heard, std::ios::binary);
-        return std::string(std::istreambuf_iterator<char>(in), {}).size();
-    };
+    const auto bytes = [&] { return base::contentOf(heard).value_or("").size(); };
     std::string said;
     {
         Sounds sounds([&](const std::string& why) { said = why; });

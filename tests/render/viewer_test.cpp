@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <channel/channel.h>
 #include <render/deformation.h>
 #include <render/screen_plan.h>
@@ -140,11 +141,7 @@ protected:
     }
     std::string pictures() const { return folder_ / "pictures"; }
     fs::path log(const std::string& name) const { return folder_ / name; }
-    std::string said(const std::string& name) const
-    {
-        std::ifstream file(log(name));
-        return {std::istreambuf_iterator<char>(file), {}};
-    }
+    std::string said(const std::string& name) const { return base::contentOf(log(name)).value_or(""); }
     bool waitFor(const std::string& picture) const
     {
         for (int i = 0; i < 600; ++i) {
@@ -312,8 +309,7 @@ TEST_F(Viewer, EndsCleanlyWhenInterrupted)
 // How many pixels of a screen have a colour: Xvfb keeps its frame buffer in a file (X11/XWDFile.h, big endian, BGRX).
 int countOnScreen(const fs::path& file, const Pixel& colour)
 {
-    std::ifstream in(file, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    const std::string bytes = base::contentOf(file).value();
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
     const auto word = [&](std::size_t n) {
         return static_cast<std::size_t>(byte(4 * n) << 24U | byte(4 * n + 1) << 16U | byte(4 * n + 2) << 8U |

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
 #include <report/chart/labels.h>
@@ -27,12 +28,6 @@ using tests::errorOf;
 using tests::Folder;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-std::string bytesOf(const std::filesystem::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
 
 Chart sample()
 {
@@ -83,7 +78,7 @@ TEST(ChartPng, EachSeriesEachBoundAndTheNoteAreInThePicture)
     Chart chart = sample();
     for (int i = 0; i < 4; ++i) {
         writeChartPng(chart, folder / "a.png");
-        pictures.push_back(bytesOf(folder / "a.png"));
+        pictures.push_back(base::contentOf(folder / "a.png").value());
         EXPECT_TRUE(pictures.back().starts_with("\x89PNG\r\n\x1a\n"));
         const auto [width, height] = sizeOf(pictures.back());
         EXPECT_GT(width, 1100U);
@@ -109,11 +104,11 @@ TEST(ChartPng, WordsBesidePointsAndLinesWithoutMarkersAreDrawn)
     writeChartPng(chart, folder / "plain.png");
     chart.series[0].written = {"fast", "", "fine"};
     writeChartPng(chart, folder / "words.png");
-    EXPECT_NE(bytesOf(folder / "words.png"), bytesOf(folder / "plain.png"));
+    EXPECT_NE(base::contentOf(folder / "words.png").value(), base::contentOf(folder / "plain.png").value());
     chart.series[0].written = {"", "", ""};
     chart.series[0].markers = false;
     writeChartPng(chart, folder / "line.png");
-    EXPECT_NE(bytesOf(folder / "line.png"), bytesOf(folder / "plain.png"));
+    EXPECT_NE(base::contentOf(folder / "line.png").value(), base::contentOf(folder / "plain.png").value());
 }
 
 // Nothing of a text is run: neither by gnuplot nor by a shell. The same chart draws the same bytes.
@@ -132,8 +127,8 @@ TEST(ChartPng, AnyTextIsOnlyText)
         writeChartPng(chart, folder / name);
     }
     EXPECT_FALSE(std::filesystem::exists(mark));
-    EXPECT_EQ(bytesOf(folder / "it's $HOME 'a'.png"), bytesOf(folder / "b.png"));
-    EXPECT_LT(sizeOf(bytesOf(folder / "b.png")).first, 3000U);
+    EXPECT_EQ(base::contentOf(folder / "it's $HOME 'a'.png").value(), base::contentOf(folder / "b.png").value());
+    EXPECT_LT(sizeOf(base::contentOf(folder / "b.png").value()).first, 3000U);
 }
 
 TEST(ChartPng, ManyNamesHaveRoomInMoreColumns)
@@ -144,7 +139,7 @@ TEST(ChartPng, ManyNamesHaveRoomInMoreColumns)
     for (const std::size_t count : {10U, 20U, 40U}) {
         chart.series.resize(count, {"elastic", {300}, {1.5}});
         writeChartPng(chart, folder / "a.png");
-        widths.push_back(sizeOf(bytesOf(folder / "a.png")).first);
+        widths.push_back(sizeOf(base::contentOf(folder / "a.png").value()).first);
     }
     EXPECT_EQ(widths[1], widths[0]);
     EXPECT_EQ(widths[2] - widths[1], widths[1] - 1254) << "the legend is twice as wide; the rest is 1254 pixels";
@@ -159,7 +154,7 @@ TEST(ChartPng, DigitsAfterSignsStay)
     writeChartPng(chart, folder / "a.png");
     chart.note = "0u";
     writeChartPng(chart, folder / "b.png");
-    EXPECT_NE(bytesOf(folder / "a.png"), bytesOf(folder / "b.png"));
+    EXPECT_NE(base::contentOf(folder / "a.png").value(), base::contentOf(folder / "b.png").value());
 }
 
 TEST(ChartPng, SaysWhatToInstallWhenGnuplotIsMissingOrFails)
@@ -257,7 +252,7 @@ TEST(ChartHtml, HoldsTheDataAndNeedsNoNetwork)
     charts[1].title = charts[1].note = "<b>bold</b>";
     charts[1].logX = false;
     writeChartHtml(charts, "A & B <i>", folder / "a.html");
-    const std::string html = bytesOf(folder / "a.html");
+    const std::string html = base::contentOf(folder / "a.html").value();
     const std::size_t begin = html.find("id=\"data\">") + 10;
     const auto data = nlohmann::json::parse(html.substr(begin, html.find("</script>", begin) - begin)).at("charts");
     ASSERT_EQ(data.size(), 2U);

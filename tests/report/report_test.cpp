@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <base/png.h>
 #include <report/data.h>
 #include <report/groups.h>
@@ -24,12 +25,6 @@ namespace {
 
 using haptics::Record;
 namespace synthetic = haptics::synthetic;
-
-std::string textOf(const std::filesystem::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
 
 std::string between(const std::string& text, const std::string& from, const std::string& to)
 {
@@ -190,7 +185,7 @@ TEST(Report, EveryContactIsDrawnOrCounted)
         const auto file = folder / std::to_string(times);
         synthetic::record(file, synthetic::info(), presses(times));
         writeReport(folder / "r.html", Record(file), {}, file);
-        return between(textOf(folder / "r.html"), "<h2>Path of the tip</h2>", "</section>");
+        return between(base::contentOf(folder / "r.html").value(), "<h2>Path of the tip</h2>", "</section>");
     };
     const auto dots = [](const std::string& text) {
         std::size_t count = 0;
@@ -216,7 +211,7 @@ TEST(Report, IsOneFileAndEscapesTheRecord)
     std::ofstream(folder / "pictures/two.png") << "Ma";
     std::ofstream(folder / "pictures/notes.txt") << "secret";
     writeReport(folder / "r.html", Record(folder / "a"), folder / "pictures");
-    const std::string html = textOf(folder / "r.html");
+    const std::string html = base::contentOf(folder / "r.html").value();
 
     EXPECT_NE(html.find("breast &lt;phantom&gt; &amp; &quot;more&quot;"), std::string::npos);
     EXPECT_EQ(html.find("<phantom>"), std::string::npos);
@@ -245,7 +240,7 @@ TEST(Report, ChartsHoldTheRecord)
     ticks[3000].distance[1] = std::numeric_limits<double>::infinity();
     synthetic::record(folder / "a", info, ticks);
     writeReport(folder / "r.html", Record(folder / "a"));
-    const std::string html = textOf(folder / "r.html");
+    const std::string html = base::contentOf(folder / "r.html").value();
     const auto data = nlohmann::json::parse(between(html, "id=\"data\">", "</script>"));
     const auto& forces = data["charts"]["forces"]["columns"];
     EXPECT_LE(forces[0].size(), 4002U);
@@ -268,7 +263,8 @@ TEST(Report, TheCapIsTheScenes)
         ticks[2000].additional = {0, 0, 4.5};
         synthetic::record(folder / cap, info, ticks);
         writeReport(folder / "r.html", Record(folder / cap));
-        const auto data = nlohmann::json::parse(between(textOf(folder / "r.html"), "id=\"data\">", "</script>"));
+        const auto data =
+            nlohmann::json::parse(between(base::contentOf(folder / "r.html").value(), "id=\"data\">", "</script>"));
         ASSERT_EQ(data["charts"]["forces"]["lines"].size(), lines) << cap;
         if (lines > 0) {
             EXPECT_DOUBLE_EQ(data["charts"]["depth"]["lines"][0]["at"].get<double>(), 5.0);
@@ -283,7 +279,8 @@ TEST(Report, ForcesBetweenGapsAreDrawn)
     const synthetic::Folder folder;
     synthetic::record(folder / "a", synthetic::info(), synthetic::procedure(5, 0.5, 1));
     writeReport(folder / "r.html", Record(folder / "a"));
-    const auto data = nlohmann::json::parse(between(textOf(folder / "r.html"), "id=\"data\">", "</script>"));
+    const auto data =
+        nlohmann::json::parse(between(base::contentOf(folder / "r.html").value(), "id=\"data\">", "</script>"));
     for (const char* chart : {"depth", "nearest"}) {
         for (const auto& series : data["charts"][chart]["series"]) {
             EXPECT_EQ(series["gaps"], false) << chart << " " << series["label"];
@@ -313,7 +310,7 @@ TEST(Report, PicturesStandInTheOrderOfTheirTimes)
         synthetic::record(folder / "a", synthetic::info(), {});
         writeReport(folder / "r.html", Record(folder / "a"), folder / "pictures");
         std::filesystem::remove(folder / "a");
-        std::string html = textOf(folder / "r.html"), all;
+        std::string html = base::contentOf(folder / "r.html").value(), all;
         for (std::string one; !(one = between(html, "<figcaption>", "</figcaption>")).empty();) {
             html.erase(0, html.find("<figcaption>") + 12);
             all += one + "|";
@@ -352,7 +349,7 @@ TEST(Report, WordsOfTablesThatScrollAreNotBroken)
     const synthetic::Folder folder;
     synthetic::record(folder / "a", synthetic::info(), synthetic::procedure(5, 0.5, 1));
     writeReport(folder / "r.html", Record(folder / "a"));
-    const std::string html = textOf(folder / "r.html");
+    const std::string html = base::contentOf(folder / "r.html").value();
     EXPECT_NE(html.find("<div class=\"scroll\"><table class=\"plain\"><thead><tr><th>Task"), std::string::npos);
     const std::size_t everywhere = html.find("table.plain td { overflow-wrap: anywhere"),
                       scrolled = html.find(".scroll table.plain:not(.facts) td { overflow-wrap: break-word");
@@ -373,7 +370,7 @@ TEST(Report, TimesStandBesideTheirTasks)
     }
     synthetic::record(folder / "a", synthetic::info(), ticks);
     writeReport(folder / "r.html", Record(folder / "a"));
-    const std::string html = textOf(folder / "r.html");
+    const std::string html = base::contentOf(folder / "r.html").value();
     for (std::size_t k = 0; k < haptics::taskCount; ++k) {
         const std::string code(haptics::taskNames[k]);
         EXPECT_EQ(between(html, "<th>" + code + "</th>", ".0</td>").back(), static_cast<char>('1' + k)) << code;
@@ -389,7 +386,7 @@ TEST(Report, EnergyIsTheRecords)
     ticks[4000].damped = 0.25;
     synthetic::record(folder / "a", synthetic::info(), ticks);
     writeReport(folder / "r.html", Record(folder / "a"));
-    const std::string html = textOf(folder / "r.html");
+    const std::string html = base::contentOf(folder / "r.html").value();
     const auto data = nlohmann::json::parse(between(html, "id=\"data\">", "</script>"));
     const auto& energy = data["charts"]["energy"]["columns"];
     EXPECT_DOUBLE_EQ(std::ranges::min(energy[1].get<std::vector<double>>()), -12.5);
@@ -401,8 +398,8 @@ TEST(Report, SessionsWithoutAnythingToShowAreTold)
     const synthetic::Folder folder;
     synthetic::record(folder / "none", synthetic::info(), {});
     writeReport(folder / "none.html", Record(folder / "none"));
-    EXPECT_NE(textOf(folder / "none.html").find("The tool never touched the body."), std::string::npos);
-    EXPECT_EQ(textOf(folder / "none.html").find("id=\"depth\""), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "none.html").value().find("The tool never touched the body."), std::string::npos);
+    EXPECT_EQ(base::contentOf(folder / "none.html").value().find("id=\"depth\""), std::string::npos);
     auto ticks = synthetic::procedure(3, 0.5, 1);
     for (auto& tick : ticks) {
         tick.fired = false;
@@ -410,8 +407,8 @@ TEST(Report, SessionsWithoutAnythingToShowAreTold)
     }
     synthetic::record(folder / "dry", synthetic::info(), ticks);
     writeReport(folder / "dry.html", Record(folder / "dry"));
-    EXPECT_NE(textOf(folder / "dry.html").find("The gun was not fired"), std::string::npos);
-    EXPECT_NE(textOf(folder / "dry.html").find("id=\"depth\""), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "dry.html").value().find("The gun was not fired"), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "dry.html").value().find("id=\"depth\""), std::string::npos);
     // Where none is asked for, nothing is missing.
     haptics::SessionInfo touch = synthetic::info();
     touch.sceneText = R"(name = "touch"
@@ -421,9 +418,9 @@ kind = "needle"
 )";
     synthetic::record(folder / "touch", touch, ticks);
     writeReport(folder / "touch.html", Record(folder / "touch"));
-    EXPECT_NE(textOf(folder / "touch.html").find("The needle rested on the skin for"), std::string::npos);
-    EXPECT_NE(textOf(folder / "touch.html").find("<span>Rest on the skin <b>"), std::string::npos);
-    EXPECT_EQ(textOf(folder / "touch.html").find("The gun was not fired"), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "touch.html").value().find("The needle rested on the skin for"), std::string::npos);
+    EXPECT_NE(base::contentOf(folder / "touch.html").value().find("<span>Rest on the skin <b>"), std::string::npos);
+    EXPECT_EQ(base::contentOf(folder / "touch.html").value().find("The gun was not fired"), std::string::npos);
 }
 
 TEST(Report, WithoutScriptsTheReaderLearnsFirstThatChartsAreMissing)

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <studies/accuracy/accuracy.h>
 #include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
@@ -70,12 +71,6 @@ TrialModel follower(const Reference& reference, double fraction)
     return model;
 }
 
-std::string bytesOf(const std::filesystem::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-
 void write(const std::filesystem::path& file, const std::string& bytes)
 {
     std::ofstream(file, std::ios::binary) << bytes;
@@ -121,7 +116,7 @@ TEST(ReferenceFile, RefusesWhatIsNoReference)
     small.states.resize(1);
     small.states[0].u = {{1e-3F, 0, 0}, {0, 2e-3F, 0}};
     saveReference(folder / "whole.ref", small, someInfo());
-    const std::string whole = bytesOf(folder / "whole.ref");
+    const std::string whole = base::contentOf(folder / "whole.ref").value();
     std::vector<std::string> damaged{"", "no reference", std::string(4096, '\xff')};
     for (std::size_t length = 1; length < whole.size(); length += 7) {
         damaged.push_back(whole.substr(0, length));

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <sweep/case.h>
 #include <sweep/formula.h>
 #include <sweep/plan.h>
@@ -17,7 +18,6 @@
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -43,12 +43,7 @@ SweepPlan planOf(const std::string& more, const std::string& set = "")
 
 std::string refusal(const std::string& text)
 {
-    try {
-        parsePlan(text, "plan.toml", namedScene);
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
+    return tests::errorOf([&] { parsePlan(text, "plan.toml", namedScene); });
 }
 
 const std::string depths = "[[axis]]\nname = \"depth_mm\"\nvalues = [4, 8]\n";
@@ -441,8 +436,7 @@ TEST(SweepFolder, ADamagedCaseIsNamedWithItsKeyAndHasNoRow)
     row.outputs.assign(folder.plan().outputs.size(), 1.0 / 3.0);
     folder.write(row);
     const auto file = home / "sweep/cases/000/0.json";
-    std::stringstream whole;
-    whole << std::ifstream(file).rdbuf();
+    const std::string whole = base::contentOf(file).value();
     std::vector<std::string> damaged;
     EXPECT_TRUE(folder.rows(&damaged).at(0));
     EXPECT_TRUE(damaged.empty());
@@ -455,7 +449,7 @@ TEST(SweepFolder, ADamagedCaseIsNamedWithItsKeyAndHasNoRow)
                                                                  {"\"checksum\"", "\"sum\""}};
     const std::vector<std::string> named{"tick_us", "build", "error", "case", "checksum", "checksum", "checksum"};
     for (std::size_t i = 0; i < edits.size(); ++i) {
-        std::string text = whole.str();
+        std::string text = whole;
         const auto at = text.find(edits[i].first);
         ASSERT_NE(at, std::string::npos) << edits[i].first << " in " << text;
         text.replace(at, edits[i].first.size(), edits[i].second);

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <training/progress_page.h>
 #include <training/simulate.h>
 
@@ -7,7 +8,6 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <regex>
@@ -18,12 +18,6 @@
 
 namespace palpate::training {
 namespace {
-
-std::string textOf(const std::filesystem::path& file)
-{
-    std::ifstream in(file);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
 
 struct Somebody {
     Curriculum curriculum;
@@ -45,7 +39,7 @@ TEST(ProgressPage, SaysWhatIsNextAndWhatTheChartAssumes)
     const tests::Folder folder;
     const Somebody somebody("<b>Eve</b>");
     writeProgressPage(folder / "p.html", somebody.people, {});
-    const std::string page = textOf(folder / "p.html");
+    const std::string page = base::contentOf(folder / "p.html").value();
     EXPECT_NE(page.find("&lt;b&gt;Eve&lt;/b&gt;"), std::string::npos);
     EXPECT_EQ(page.find("<b>Eve</b>"), std::string::npos);
     EXPECT_NE(page.find("p0 = 0.1, p1 = 0.3, alpha = 0.05, beta = 0.1"), std::string::npos);
@@ -77,7 +71,7 @@ TEST(ProgressPage, NamesTheNextExerciseAsAShellTakesIt)
     std::filesystem::copy_file(known.file, own.file);
     const Somebody one("Eve", known), two("Eve", own), three("Eve", other);
     writeProgressPage(folder / "p.html", {one.people[0], two.people[0], three.people[0]}, {});
-    const std::string page = textOf(folder / "p.html"), file = own.file.string();
+    const std::string page = base::contentOf(folder / "p.html").value(), file = own.file.string();
     const std::regex command("--exercise &#39;(.*?)&#39;</pre>");
     std::vector<std::string> named;
     for (std::sregex_iterator at(page.begin(), page.end(), command); at != std::sregex_iterator(); ++at) {
@@ -102,7 +96,7 @@ TEST(ProgressPage, LimitsHaveTheirValueAndUnit)
         session.values.erase("ct_dose_mgy_cm");
     }
     writeProgressPage(folder / "p.html", somebody.people, {});
-    const std::string page = textOf(folder / "p.html");
+    const std::string page = base::contentOf(folder / "p.html").value();
     EXPECT_NE(page.find("\"words\":\"at most 0\""), std::string::npos);
     EXPECT_NE(page.find("\"words\":\"at least 33.5 %\""), std::string::npos);
     EXPECT_NE(page.find("Dose of the CT scans</h3><p class=\"note\">-: no session had a CT scanner; level: at most 120.0 "
@@ -115,7 +109,7 @@ TEST(ProgressCsv, HasALineForEachSession)
     const tests::Folder folder;
     const Somebody somebody("=cmd,\"x\"");
     writeProgressCsv(folder / "p.csv", somebody.people);
-    std::istringstream in(textOf(folder / "p.csv"));
+    std::istringstream in(base::contentOf(folder / "p.csv").value());
     std::string line;
     std::getline(in, line);
     EXPECT_EQ(line.find("name,session,started,curriculum,exercise,case,mode,guidance,met"), 0U);
@@ -132,7 +126,7 @@ TEST(ProgressCsv, BeginsWithTheGroupWhereThereAreGroups)
     const Somebody anna("anna"), bert("bert");
     const std::vector<PeopleGroup> groups{{"a, b", anna.people}, {"c", bert.people}};
     writeProgressCsv(folder / "g.csv", bert.people, groups);
-    std::istringstream in(textOf(folder / "g.csv"));
+    std::istringstream in(base::contentOf(folder / "g.csv").value());
     std::string line;
     std::getline(in, line);
     EXPECT_TRUE(line.starts_with("group,name,session,")) << line;
@@ -154,8 +148,8 @@ TEST(Xapi, StatementsAreWholeAndTheSameAgain)
     const Somebody somebody("P-07");
     writeXapi(folder / "a.json", somebody.people);
     writeXapi(folder / "b.json", somebody.people);
-    EXPECT_EQ(textOf(folder / "a.json"), textOf(folder / "b.json"));
-    const auto statements = nlohmann::json::parse(textOf(folder / "a.json"));
+    EXPECT_EQ(base::contentOf(folder / "a.json").value(), base::contentOf(folder / "b.json").value());
+    const auto statements = nlohmann::json::parse(base::contentOf(folder / "a.json").value());
     ASSERT_EQ(statements.size(), somebody.people[0].sessions.size());
     const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"),
         iri("[a-z]+:[A-Za-z0-9._~:/%-]+");
@@ -180,8 +174,8 @@ TEST(Xapi, HasEachSessionOfGroupsOnce)
     const Somebody anna("anna");
     writeXapi(folder / "g.json", {}, {{"a", anna.people}});
     writeXapi(folder / "both.json", anna.people, {{"a", anna.people}, {"b", anna.people}});
-    EXPECT_EQ(nlohmann::json::parse(textOf(folder / "g.json")).size(), anna.people[0].sessions.size());
-    EXPECT_EQ(textOf(folder / "g.json"), textOf(folder / "both.json"));
+    EXPECT_EQ(nlohmann::json::parse(base::contentOf(folder / "g.json").value()).size(), anna.people[0].sessions.size());
+    EXPECT_EQ(base::contentOf(folder / "g.json").value(), base::contentOf(folder / "both.json").value());
 }
 
 TEST(Xapi, NamesWithBlanksMakeNoWrongIri)
@@ -193,7 +187,7 @@ TEST(Xapi, NamesWithBlanksMakeNoWrongIri)
     sessions[0].exercise = sessions[0].caseId = "";
     sessions[0].scene = "my scene/Leber \xc3\xbc";
     writeXapi(folder / "a.json", somebody.people);
-    EXPECT_EQ(nlohmann::json::parse(textOf(folder / "a.json"))[0]["object"]["id"],
+    EXPECT_EQ(nlohmann::json::parse(base::contentOf(folder / "a.json").value())[0]["object"]["id"],
               "urn:palpate:case:my%20scene%2FLeber%20%C3%BC");
 }
 

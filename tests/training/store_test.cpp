@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <datasets/scene.h>
 #include <datasets/scene_text.h>
 #include <training/store.h>
@@ -36,12 +37,6 @@ StoredSession sessionWith(double total, const std::string& started = "2026-11-22
     s.guidance = 0.25;
     s.values = {{"total", total}, {"vital_margin_mm", INFINITY}};
     return s;
-}
-
-std::string bytesOf(const fs::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
 mode_t modeOf(const fs::path& file)
@@ -166,7 +161,7 @@ TEST(ProfileStore, ReadsWhatCannotBeWritten)
     }
     Database(file.string(), SQLITE_OPEN_READWRITE)
         .execute("ALTER TABLE session DROP COLUMN note; ALTER TABLE session DROP COLUMN rating; PRAGMA user_version = 1");
-    const std::string before = bytesOf(file);
+    const std::string before = base::contentOf(file).value();
     fs::permissions(folder.path(), fs::perms(0755));
     fs::permissions(file, fs::perms(0444));
     fs::permissions(sub, fs::perms(0555));
@@ -178,7 +173,7 @@ TEST(ProfileStore, ReadsWhatCannotBeWritten)
         EXPECT_EQ(store.sessions(store.find("anna")).at(0).values.at("total"), 40);
     }
     fs::permissions(sub, fs::perms(0755));
-    EXPECT_EQ(bytesOf(file), before);
+    EXPECT_EQ(base::contentOf(file).value(), before);
     EXPECT_EQ(std::distance(fs::directory_iterator(sub), fs::directory_iterator()), 1);
 }
 
@@ -219,9 +214,9 @@ TEST(ProfileStore, RefusesWhatItDoesNotKnow)
         other.execute("CREATE TABLE bookmarks (x)");
     }
     EXPECT_NE(errorOf([&] { ProfileStore(folder / "new.db"); }).find("newer Palpate"), std::string::npos);
-    const std::string before = bytesOf(folder / "other.db");
+    const std::string before = base::contentOf(folder / "other.db").value();
     EXPECT_NE(errorOf([&] { ProfileStore(folder / "other.db"); }).find("no file of profiles"), std::string::npos);
-    EXPECT_EQ(bytesOf(folder / "other.db"), before);
+    EXPECT_EQ(base::contentOf(folder / "other.db").value(), before);
     std::ofstream(folder / "text.db") << std::string(5000, 'x');
     EXPECT_NE(errorOf([&] { ProfileStore(folder / "text.db"); }), "");
 }
@@ -246,7 +241,7 @@ TEST(ProfileStore, ErasedIsGoneFromTheBytesToo)
     EXPECT_EQ(erased.elsewhere[0], folder / "elsewhere.db");
     EXPECT_FALSE(fs::exists(store.recordFolder() / "own.db"));
     for (const char* file : {"p.db", "p.db-wal"}) {
-        EXPECT_EQ(bytesOf(folder / file).find("Annabella"), std::string::npos) << file;
+        EXPECT_EQ(base::contentOf(folder / file).value().find("Annabella"), std::string::npos) << file;
     }
     EXPECT_EQ(store.sessions(store.find("bert")).size(), 1U);
 }
@@ -369,9 +364,9 @@ TEST(ProfileStore, TheWindowForgetsOnlyWhoIsErased)
     const fs::path settings = folder / "trainer.json";
     std::ofstream(settings) << R"({"person": "anna", "text_scale": 1.5, "later": [1]})";
     forgetLastPerson(settings, "bert");
-    EXPECT_NE(bytesOf(settings).find("anna"), std::string::npos);
+    EXPECT_NE(base::contentOf(settings).value().find("anna"), std::string::npos);
     forgetLastPerson(settings, "anna");
-    const auto left = nlohmann::json::parse(bytesOf(settings));
+    const auto left = nlohmann::json::parse(base::contentOf(settings).value());
     EXPECT_EQ(left, (nlohmann::json{{"person", ""}, {"text_scale", 1.5}, {"later", {1}}}));
     forgetLastPerson(folder / "none.json", "anna");
     EXPECT_FALSE(fs::exists(folder / "none.json"));

@@ -1,4 +1,5 @@
 // An emulated Novint Falcon that a virtual machine sees on its USB: QEMU's usb-redir connects to it. See docs/devices.md.
+#include <base/inputs.h>
 #include <tests/falcon/emulator.h>
 
 #include <base/error.h>
@@ -21,7 +22,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <deque>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <sstream>
@@ -391,9 +391,9 @@ int connectTo(const std::string& path)
 
 void run(const std::string& path, const std::string& firmware)
 {
-    std::ifstream stream(firmware, std::ios::binary);
-    base::failIf(!stream, "{}: cannot be read: give the firmware that the emulated Falcon runs", firmware);
-    Emulator device({std::istreambuf_iterator<char>(stream), {}});
+    const auto program = base::contentOf(firmware);
+    base::failIf(!program, "{}: cannot be read: give the firmware that the emulated Falcon runs", firmware);
+    Emulator device({program->begin(), program->end()});
     const int socket = connectTo(path);
     Server server(device, socket);
     Orders orders(device, server);

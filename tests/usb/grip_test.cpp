@@ -1,5 +1,6 @@
 // Buttons of an emulated Falcon behind a kernel that umockdev plays, in the programs as a user starts them. Run it under
 // umockdev-wrapper.
+#include <base/inputs.h>
 #include <tests/apps/desktop.h>
 #include <tests/falcon/rig.h>
 #include <tests/usb/kernel.h>
@@ -12,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -63,8 +63,7 @@ struct GripBench {
 
 std::string wordsOf(const fs::path& process)
 {
-    std::ifstream in(process / "cmdline");
-    std::string words{std::istreambuf_iterator<char>(in), {}};
+    std::string words = base::contentOf(process / "cmdline").value_or("");
     std::ranges::replace(words, '\0', ' ');
     return words;
 }

@@ -1,4 +1,5 @@
 // DICOM segmentations made here with DCMTK: sparse, overlapping, packed frames.
+#include <base/inputs.h>
 #include <tests/error_of.h>
 #include <tests/folder.h>
 #include <tests/volume/files.h>
@@ -306,14 +307,13 @@ std::vector<Uint8> jpeg2000(const fs::path& file, const std::vector<int>& pixels
     opj_stream_destroy(stream);
     opj_destroy_codec(codec);
     opj_image_destroy(image);
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    const std::string bytes = base::contentOf(file).value();
+    return {bytes.begin(), bytes.end()};
 }
 
 void replaceIn(const fs::path& file, const std::string& from, const std::string& to)
 {
-    std::ifstream in(file, std::ios::binary);
-    std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    std::string bytes = base::contentOf(file).value();
     ASSERT_EQ(from.size(), to.size());
     ASSERT_NE(bytes.find(from), std::string::npos);
     bytes.replace(bytes.find(from), from.size(), to);

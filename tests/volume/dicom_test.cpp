@@ -1,4 +1,5 @@
 // DICOM series and segmentations made here with DCMTK, slice by slice.
+#include <base/inputs.h>
 #include <tests/volume/files.h>
 #include <volume/import.h>
 
@@ -189,8 +190,7 @@ TEST_F(Dicom, DamagedCompressedPixelsAreTakenOrRefused)
         SCOPED_TRACE(DcmXfer(syntax).getXferName());
         writePacked("a", 0, syntax);
         ASSERT_EQ(reason(), "");
-        std::ifstream in(folder / "a", std::ios::binary);
-        const std::string whole{std::istreambuf_iterator<char>(in), {}};
+        const std::string whole = base::contentOf(folder / "a").value();
         std::size_t refused = 0;
         const std::size_t pixels = whole.rfind("\xe0\x7f\x10");
         ASSERT_NE(pixels, std::string::npos);

@@ -1,12 +1,12 @@
 #include <volume/import/dicom_file.h>
 #include <volume/import/dicom_load.h>
 
+#include <base/inputs.h>
+
 #include <dcmtk/dcmdata/dcistrmb.h>
 #include <zlib.h>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
 #include <map>
 
 namespace palpate::volume {
@@ -32,8 +32,7 @@ std::string nameOf(const std::string& uid)
 OFCondition loadAsJpeg(const std::filesystem::path& file, DcmFileFormat& format)
 {
     constexpr std::size_t metaBytes = 4096;
-    std::ifstream in(file, std::ios::binary);
-    std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    std::string bytes = base::contentOf(file).value_or("");
     const std::string own = std::string(deflatedFrames) + '\0';  // padded to an even length
     const std::string other = UID_JPEGProcess1TransferSyntax;
     const auto at = bytes.substr(0, metaBytes).find(own);

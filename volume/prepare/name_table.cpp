@@ -8,8 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <fstream>
-#include <iterator>
+#include <optional>
 #include <regex>
 #include <sstream>
 
@@ -25,10 +24,9 @@ constexpr std::size_t longestLine = 1000;  // std::regex needs a frame of the st
 std::string textOf(const std::filesystem::path& file)
 {
     base::checkTable(file, "a table of names");
-    std::ifstream in(file, std::ios::binary);
-    std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-    base::failIf(in.bad() || !in.is_open(), "{}: cannot be read: check its permissions", file.native());
-    return text;
+    std::optional<std::string> text = base::contentOf(file);
+    base::failIf(!text, "{}: cannot be read: check its permissions", file.native());
+    return *std::move(text);
 }
 
 std::uint8_t byteOf(const std::string& text)
