@@ -307,7 +307,8 @@ std::vector<Uint8> jpeg2000(const fs::path& file, const std::vector<int>& pixels
     opj_stream_destroy(stream);
     opj_destroy_codec(codec);
     opj_image_destroy(image);
-    return base::contentOf(file).value_or("");
+    const std::string bytes = base::contentOf(file).value();
+    return {bytes.begin(), bytes.end()};
 }
 
 void replaceIn(const fs::path& file, const std::string& from, const std::string& to)
