@@ -30,7 +30,7 @@ using Labels = std::vector<std::uint16_t>;
 constexpr std::size_t maxSamples = 2'000'000;   // of the search for the target
 constexpr std::size_t maxFieldNodes = 300'000;  // of a distance field
 constexpr int directionCount = 600;
-constexpr int borderVoxels = 3;          // the body's surface so near to the image's border is a cut, not skin
+constexpr int borderVoxels = 3;          // a surface with fewer voxels of air to the image's border is a cut, not skin
 constexpr double freeOutside = 0.06;     // length of needle that must be in air before it enters [m]
 constexpr double beyondTip = 3e-3;       // a line must also be clear so far beyond the fired tip [m]
 constexpr double startDistance = 0.03;   // of the tip from the skin, before and after [m]
@@ -193,12 +193,18 @@ bool outside(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
 bool nearBorder(const Tissue& tissue, Vec3 p)
 {
     const Vec3 index = tissue.affine().toIndex(p);
-    const Index3 farthest = tissue.size() - 1 - borderVoxels;
-    return glm::any(glm::lessThan(index, Vec3(borderVoxels))) || glm::any(glm::greaterThan(index, Vec3(farthest)));
+    const double nearest = borderVoxels - 0.5;  // the face of the first voxel behind those of air
+    const Vec3 farthest = Vec3(tissue.size() - 1) - nearest;
+    return glm::any(glm::lessThan(index, Vec3(nearest))) || glm::any(glm::greaterThan(index, farthest));
 }
 
-// Where the way from `aim` along `direction` leaves the body for good, or nothing when that is no place to enter.
-std::optional<Vec3> exitPoint(const Surroundings& s, const Tissue::Reader& reader, Vec3 aim, Vec3 direction)
+/// Where a way leaves the body for good.
+struct Exit {
+    std::optional<Vec3> point;  // nothing: no place to enter
+    bool atBorder = false;      // of the image, which may cut the body there
+};
+
+Exit exitPoint(const Surroundings& s, const Tissue::Reader& reader, Vec3 aim, Vec3 direction)
 {
     double inside = 0;
     for (double t = 0; t < s.reach && t < inside + freeOutside; t += s.step) {
@@ -206,17 +212,20 @@ std::optional<Vec3> exitPoint(const Surroundings& s, const Tissue::Reader& reade
     }
     double beyond = inside + s.step;
     const Vec3 last = aim + inside * direction;
-    if (nearBorder(s.tissue, last) || outside(s, reader, last)) {
-        return std::nullopt;
+    if (outside(s, reader, last)) {
+        return {};
+    }
+    if (nearBorder(s.tissue, last)) {
+        return {{}, true};
     }
     if (s.hasSkin && s.tissue.table().rows[reader.tissue(last)].role != Role::skin) {
-        return std::nullopt;
+        return {};
     }
     for (int halving = 0; halving < 8; ++halving) {
         const double middle = (inside + beyond) / 2;
         (outside(s, reader, aim + middle * direction) ? beyond : inside) = middle;
     }
-    return aim + beyond * direction;
+    return {aim + beyond * direction};
 }
 
 // Unit vector out of the body around `p` on its surface: from the middle of what is tissue to the middle of what is air.
@@ -248,11 +257,19 @@ double halfNotch(const ToolSpec& tool)
     return tool.kind == ToolKind::needle ? tool.notchLength / 2 : 0.0;
 }
 
-// The way into `aim` along -`direction`, if there is one.
+static_assert(borderVoxels == 3);
+constexpr const char* cutOff = "out within 3 voxels of the volume's border, where it may cut the body";
+
+// The way into `aim` along -`direction`, if there is one, or with a refusal.
 std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const Tissue::Reader& reader, Vec3 aim,
                               Vec3 direction)
 {
-    const std::optional<Vec3> entry = exitPoint(s, reader, aim, direction);
+    const auto [entry, atBorder] = exitPoint(s, reader, aim, direction);
+    if (atBorder) {
+        Line cut;
+        cut.way.verdict.refusals = {cutOff};
+        return cut;
+    }
     if (!entry || glm::length(*entry - aim) > scene.tool.length) {
         return std::nullopt;
     }
@@ -295,6 +312,26 @@ void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vect
     }
 }
 
+// Why no way to the target is good enough, and what to do.
+[[noreturn]] void refuseAll(const Scene& scene, const std::vector<Line>& lines, const std::map<std::string, int>& refused,
+                            double least)
+{
+    std::string reasons = fmt::format("{} ways reach it", lines.size());
+    for (const auto& [why, ways] : refused) {
+        reasons += fmt::format("; {} go {}", ways, why);
+    }
+    if (!lines.empty()) {
+        const auto wider = [](const Line& a, const Line& b) { return a.way.clearance < b.way.clearance; };
+        const double widest = std::max_element(lines.begin(), lines.end(), wider)->way.clearance;
+        reasons += fmt::format("; the widest keeps {:.1f} mm", 1e3 * std::max(0.0, widest));
+    }
+    const bool isCut = refused.contains(cutOff);
+    throw base::error(
+        "{}: no straight way to '{}' from the skin{} ({}): {}set entry_mm and aim_mm in [target]", scene.name, scene.target,
+        lines.empty() && isCut ? "" : fmt::format(" that keeps {:g} mm from vital structures and bone", 1e3 * least),
+        reasons, isCut ? "add 4 voxels of air around the body (palpate import --pad MM), or " : "");
+}
+
 // All lines to the target that keep `margin` from what is forbidden, or nothing to say how far, the most of `clearances`
 // that some keep; the best first.
 std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optional<double> margin)
@@ -316,19 +353,7 @@ std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optio
             return good;
         }
     }
-    std::string reasons;
-    for (const auto& [why, ways] : refused) {
-        reasons += fmt::format("; {} go {}", ways, why);
-    }
-    if (!lines.empty()) {
-        const auto wider = [](const Line& a, const Line& b) { return a.way.clearance < b.way.clearance; };
-        const double widest = std::max_element(lines.begin(), lines.end(), wider)->way.clearance;
-        reasons += fmt::format("; the widest keeps {:.1f} mm", 1e3 * std::max(0.0, widest));
-    }
-    throw base::error(
-        "{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
-        "reach it{}): set entry_mm and aim_mm in [target]",
-        scene.name, scene.target, wanted.back() * 1e3, lines.size(), reasons);
+    refuseAll(scene, lines, refused, wanted.back());
 }
 
 // Two lines between which there is something to choose.

@@ -31,7 +31,7 @@ py::object plan(const py::object& what, double error, const std::optional<double
     }
     nlohmann::json figures;
     {
-        const py::gil_scoped_release others;
+        const Unlocked others;
         box.scene.model.level = datasets::ModelLevel::spring;  // the bodies are made by the planner, one per spacing
         auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
         const auto model = haptics::buildModel(std::move(box.scene), std::move(tissue));

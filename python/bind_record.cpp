@@ -29,7 +29,7 @@ struct RecordBox {
 template <class Work>
 auto alone(const RecordBox& box, Work&& work)
 {
-    const py::gil_scoped_release others;
+    const Unlocked others;
     const std::lock_guard mine(box.guard);
     return work();
 }
@@ -59,7 +59,7 @@ py::dict infoOf(const RecordBox& box)
     const haptics::SessionInfo& info = box.record.info();
     py::dict out;
     out["scene"] = info.scene;
-    out["scene_origin"] = info.sceneOrigin;
+    out["scene_origin"] = textOf(info.sceneOrigin);
     out["model"] = info.model;
     out["device"] = info.device;
     out["build"] = info.build;
@@ -113,7 +113,7 @@ py::dict resultsOf(const RecordBox& box)
 
 std::shared_ptr<Modelled> modelOfRecord(const RecordBox& box)
 {
-    const py::gil_scoped_release others;
+    const Unlocked others;
     auto made =
         std::make_shared<Modelled>(session::reopenSession(box.file, box.record.info()), box.record.info().sceneOrigin);
     made->info.rate = box.record.info().rate;
@@ -127,7 +127,7 @@ void bindRecord(py::module_& module)
 {
     py::class_<RecordBox>(module, "RecordFile")
         .def(py::init<const std::filesystem::path&>(), py::arg("file"))
-        .def_property_readonly("file", [](const RecordBox& box) { return box.file; })
+        .def_property_readonly("file", [](const RecordBox& box) { return textOf(box.file); })
         .def_property_readonly("info", &infoOf)
         .def_property_readonly("scene_text", [](const RecordBox& box) { return box.record.info().sceneText; })
         .def_property_readonly("complete",

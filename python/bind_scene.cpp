@@ -30,7 +30,9 @@ std::string textOfPath(const py::object& what)
     if (utf8 == nullptr) {
         throw py::error_already_set();  // half a character is a ValueError
     }
-    return {utf8, static_cast<std::size_t>(size)};
+    const std::string path{utf8, static_cast<std::size_t>(size)};
+    refuseIf(path.find('\0') != std::string::npos, "scene: the name holds a NUL character");
+    return path;
 }
 
 SceneBox parsed(const std::string& text, const std::string& origin)
@@ -45,6 +47,7 @@ SceneBox parsed(const std::string& text, const std::string& origin)
 #ifdef PALPATE_SWEEP
 sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
 {
+    refuseMasked(value, key);
     // A scalar of numpy is what its item() is.
     const py::object plain = py::hasattr(value, "item") ? py::object(value.attr("item")()) : value;
     if (py::isinstance<py::bool_>(plain)) {
@@ -63,13 +66,11 @@ sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
         return plain.cast<double>();
     }
     if (py::isinstance<py::str>(plain)) {
-        return plain.cast<std::string>();
+        return wordOf(plain, key.c_str());
     }
     throw py::type_error("key '" + key + "': give a number, a word, True or False");
 }
-#endif
 
-#ifdef PALPATE_SWEEP
 // What a volume in memory cannot follow: its tissue table is left out.
 std::string sourceText(datasets::Scene scene)
 {
@@ -93,9 +94,45 @@ SceneBox withScene(SceneBox box, datasets::Scene scene)
                  "volume: the volume of this scene is in memory alone and stays as it is: make another one, or save it "
                  "(Volume.save) and make the scene of that file");
     auto table = datasets::withChanges(box.volume->table(), box.scene.tissueChanges);
-    const py::gil_scoped_release others;
+    const Unlocked others;
     box.volume = std::make_shared<const volume::Tissue>(datasets::withTable(*box.volume, std::move(table)));
     return box;
+}
+#endif
+
+// A scene of the tables of a scene file. Files in it are relative to the working folder; an error says neither a file nor a
+// line, which there are none of.
+SceneBox ofTables(const py::dict& tables)
+{
+    const auto text = py::module_::import("palpate._toml").attr("dumps")(tables).cast<std::string>();
+    const std::string place = (std::filesystem::current_path() / "keywords").string();
+    try {
+        return {datasets::parseScene(text, place), place, nullptr, false};
+    } catch (const std::runtime_error& e) {
+        std::string what = e.what();
+        if (what.starts_with(place + ":")) {
+            what.erase(0, what.find(": ", place.size()) + 2);
+        }
+        throwSceneError(what);
+    }
+}
+
+#ifdef PALPATE_SWEEP
+bool isTables(const py::object& value)
+{
+    bool isTables = py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value);
+    for (py::size_t i = 0; isTables && i < py::len(value); ++i) {
+        isTables = py::isinstance<py::dict>(value[py::int_(i)]);
+    }
+    return isTables;
+}
+
+// A scene with arrays of tables ([[vital]], [[insert]], [[script]]) replaced as a whole.
+datasets::Scene withTables(const datasets::Scene& scene, const py::dict& arrays)
+{
+    auto all = py::dict(py::module_::import("tomllib").attr("loads")(datasets::sceneText(scene)));
+    all.attr("update")(arrays);
+    return ofTables(all).scene;
 }
 #endif
 
@@ -103,7 +140,16 @@ SceneBox changed(const SceneBox& box, const py::dict& tables)
 {
 #ifdef PALPATE_SWEEP
     std::vector<sweep::Setting> settings;
+    py::dict arrays;
     for (const auto& [key, value] : flattened(tables)) {
+        if (isTables(value) && key.find('.') == std::string::npos) {
+            arrays[py::str(key)] = value;
+            continue;
+        }
+        if (isTables(value) && py::len(value) > 0) {
+            throwSceneError("key '" + key +
+                            "': a list of tables stands at the top of a scene, as vital, insert and script do");
+        }
         const bool isVector = py::isinstance<py::array>(value) && py::reinterpret_borrow<py::array>(value).size() != 1;
         if (isVector || py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
             const Vec3 point = vec3Of(value, key.c_str());
@@ -115,7 +161,7 @@ SceneBox changed(const SceneBox& box, const py::dict& tables)
         }
     }
     try {
-        return withScene(box, sweep::sceneWith(box.scene, settings));
+        return withScene(box, sweep::sceneWith(arrays.empty() ? box.scene : withTables(box.scene, arrays), settings));
     } catch (const std::runtime_error& e) {
         throwSceneError(e.what());
     }
@@ -132,18 +178,7 @@ SceneBox fromKeywords(const py::object& source, const py::kwargs& tables)
         SceneBox box = sceneOf(source);
         return tables.empty() ? box : changed(box, tables);
     }
-    const auto text = py::module_::import("palpate._toml").attr("dumps")(tables).cast<std::string>();
-    // Files in it are relative to this folder; an error says neither a file nor a line, which there are none of.
-    const std::string place = (std::filesystem::current_path() / "keywords").string();
-    try {
-        return {datasets::parseScene(text, place), place, nullptr, false};
-    } catch (const std::runtime_error& e) {
-        std::string what = e.what();
-        if (what.starts_with(place + ":")) {
-            what.erase(0, what.find(": ", place.size()) + 2);
-        }
-        throwSceneError(what);
-    }
+    return ofTables(tables);
 }
 
 SceneBox forVolume(const py::object& what, const std::string& target)
@@ -262,7 +297,7 @@ std::shared_ptr<const Modelled> modelOf(const py::object& what)
         return what.cast<std::shared_ptr<Modelled>>();
     }
     SceneBox box = sceneOf(what);
-    const py::gil_scoped_release others;
+    const Unlocked others;
     auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
     auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), tissue), box.origin);
     made->given = std::move(tissue);
@@ -283,7 +318,7 @@ void bindScene(py::module_& module)
              })
         .def_property_readonly("name", [](const SceneBox& box) { return box.scene.name; })
         .def_property_readonly("text", [](const SceneBox& box) { return datasets::sceneText(box.scene); })
-        .def_property_readonly("origin", [](const SceneBox& box) { return box.origin; })
+        .def_property_readonly("origin", [](const SceneBox& box) { return textOf(box.origin); })
         .def_property_readonly("target", [](const SceneBox& box) { return box.scene.target; })
         .def("__repr__", [](const SceneBox& box) { return "<palpate.Scene '" + box.scene.name + "'>"; });
     bindModel(module);

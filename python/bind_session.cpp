@@ -14,15 +14,12 @@
 
 #include <cmath>
 #include <limits>
-#include <new>
-#include <string_view>
 
 namespace palpate::python {
 
 namespace {
 
 using haptics::DeviceSample;
-using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// A session, what of it is made when first asked for, and what an interrupted run has done.
 struct SessionBox {
@@ -71,41 +68,6 @@ DeviceSample sampleOf(const double* pose, py::ssize_t numbers, Vec3 axis, std::u
     return sample;
 }
 
-// Numbers as Python's caller gave them, none of which are words.
-Doubles doublesOf(const py::handle& given, const char* name, const char* wanted)
-{
-    // numpy.ma alone adds this to an array. What it hides would be taken for numbers.
-    const bool masked = py::isinstance<py::array>(given) && py::hasattr(given, "mask");
-    refuseIf(masked, name, ": is a masked array: give a plain one, such as its filled()");
-    const auto array = py::array::ensure(given);
-    const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
-    auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
-    if (isNumbers && !numbers && array.dtype().kind() != 'O') {
-        throw std::bad_alloc();  // nothing else can go wrong with numbers
-    }
-    if (!isNumbers || !numbers) {
-        PyErr_Clear();
-        throw py::value_error(std::string(name) + ": " + wanted);
-    }
-    return numbers;
-}
-
-TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, bool fresh)
-{
-    constexpr const char* shapes =
-        "give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the probe's move";
-    // Of a list numpy makes numbers at once, which is faster, and refuses what is none.
-    const auto numbers = py::isinstance<py::array>(pose) ? doublesOf(pose, "pose", shapes) : Doubles::ensure(pose);
-    if (!numbers || numbers.ndim() != 1 || !isPoseOf(numbers.shape(0))) {
-        PyErr_Clear();
-        throw py::value_error(std::string("pose: ") + shapes);
-    }
-    const LiveSession::Use use(box.live);
-    const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
-    const py::gil_scoped_release others;
-    return {rowOf(box.live.step(sample))};
-}
-
 // Whole numbers from 0 to `most`, one or `rows` of them.
 Doubles columnOf(const py::object& given, py::ssize_t rows, const char* name, double most, const char* wanted)
 {
@@ -121,6 +83,36 @@ Doubles columnOf(const py::object& given, py::ssize_t rows, const char* name, do
     return column;
 }
 
+constexpr double buttonBits = std::numeric_limits<std::uint32_t>::max();
+constexpr const char* buttonsWanted = "give sums of DEADMAN, FIRE, MARK and UNMARK, whole numbers below 2**32";
+constexpr const char* freshWanted = "give True or False";
+
+// One of them, which is mostly an int.
+double oneOf(const py::object& given, const char* name, double most, const char* wanted)
+{
+    if (PyLong_CheckExact(given.ptr()) || PyBool_Check(given.ptr())) {
+        int overflow = 0;
+        const auto value = static_cast<double>(PyLong_AsLongLongAndOverflow(given.ptr(), &overflow));
+        refuseIf(overflow != 0 || !(value >= 0 && value <= most), name, ": ", wanted);
+        return value;
+    }
+    return columnOf(given, 1, name, most, wanted).data()[0];
+}
+
+TickBox step(SessionBox& box, const py::object& pose, const py::object& buttons, const py::object& fresh)
+{
+    constexpr const char* shapes =
+        "give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the probe's move";
+    const auto numbers = doublesOf(pose, "pose", shapes);
+    refuseIf(numbers.ndim() != 1 || !isPoseOf(numbers.shape(0)), "pose: ", shapes);
+    const auto pressed = static_cast<std::uint32_t>(oneOf(buttons, "buttons", buttonBits, buttonsWanted));
+    const bool isFresh = oneOf(fresh, "fresh", 1, freshWanted) != 0;
+    const LiveSession::Use use(box.live);
+    const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), pressed, isFresh);
+    const Unlocked others;
+    return {rowOf(box.live.step(sample))};
+}
+
 /// What run() and advance() take, as Python's caller gave it.
 struct Given {
     const py::object &poses, &buttons, &fresh;
@@ -130,13 +122,11 @@ std::vector<DeviceSample> samplesOf(const Given& given, Vec3 axis)
 {
     constexpr const char* shapes =
         "give an array of n x 3 (positions), n x 6 (and axes) or n x 12 (and the probe's moves), in metres";
-    constexpr double buttonBits = std::numeric_limits<std::uint32_t>::max();
     const Doubles poses = doublesOf(given.poses, "poses", shapes);
     refuseIf(poses.ndim() != 2 || !isPoseOf(poses.shape(1)), "poses: ", shapes);
     const py::ssize_t rows = poses.shape(0);
-    const Doubles buttons = columnOf(given.buttons, rows, "buttons", buttonBits,
-                                     "give sums of DEADMAN, FIRE, MARK and UNMARK, whole numbers below 2**32");
-    const Doubles fresh = columnOf(given.fresh, rows, "fresh", 1, "give True or False");
+    const Doubles buttons = columnOf(given.buttons, rows, "buttons", buttonBits, buttonsWanted);
+    const Doubles fresh = columnOf(given.fresh, rows, "fresh", 1, freshWanted);
     std::vector<DeviceSample> samples;
     samples.reserve(static_cast<std::size_t>(rows));
     for (py::ssize_t i = 0; i < rows; ++i) {
@@ -147,25 +137,38 @@ std::vector<DeviceSample> samplesOf(const Given& given, Vec3 axis)
     return samples;
 }
 
-// Runs a device to its end, or to a KeyboardInterrupt, which is then set. The session must be in use.
+// Runs a device to its end, or to an exception, such as KeyboardInterrupt, which is then set. The session must be in use.
 bool runDevice(SessionBox& box, haptics::Device& device, double seconds,
                const std::function<void(const haptics::TickRecord&)>& each)
 {
-    const py::gil_scoped_release others;
+    box.interrupted = py::none();
+    const Unlocked others;
     return box.live.run(device, seconds, each, [] {
+        if (ending()) {
+            return false;
+        }
         const py::gil_scoped_acquire mine;
         return PyErr_CheckSignals() == 0;
     });
 }
 
-// Throws the exception that ended a run. Its rows are made beside it: what runs Python clears an exception that is set.
+// Throws the exception that stopped a run.
+[[noreturn]] void throwStopped()
+{
+    if (PyErr_Occurred() == nullptr) {
+        throwEnding();
+    }
+    throw py::error_already_set();
+}
+
+// The same. Its rows are made beside it: what runs Python clears an exception that is set.
 [[noreturn]] void throwInterrupted(SessionBox& box, const std::function<py::object()>& rows)
 {
     {
         const py::error_scope kept;
         box.interrupted = rows();
     }
-    throw py::error_already_set();
+    throwStopped();
 }
 
 py::array run(SessionBox& box, const py::object& poses, const py::object& buttons, const py::object& fresh)
@@ -188,12 +191,12 @@ std::size_t advance(SessionBox& box, const py::object& poses, const py::object& 
     const auto samples = samplesOf({poses, buttons, fresh}, box.live.axis());
     PosesDevice device(samples);
     if (!runDevice(box, device, 0, {})) {
-        throw py::error_already_set();
+        throwStopped();
     }
     return samples.size();
 }
 
-py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
+py::array perform(SessionBox& box, const std::string& trainee, const py::object& seed, double seconds)
 {
     refuseIf(!(seconds >= 0), "seconds: has to be 0 or more");
     const double rate = box.live.modelled().info.rate;
@@ -202,7 +205,7 @@ py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t see
     const LiveSession::Use use(box.live);
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
-    request.seed = seed;
+    request.seed = seedOf(seed, "seed");
     const auto device = session::openDevice(box.live.modelled().model, request, nullptr);
     std::vector<TickRow> rows;
     const bool whole =
@@ -266,6 +269,23 @@ py::list coresOf(SessionBox& box)
     return out;
 }
 
+// Where the caller has the probe; nothing: where the scene has it.
+std::optional<ultrasound::Pose> poseOfProbe(const py::object& face, const py::object& direction, const py::object& lateral)
+{
+    if (face.is_none()) {
+        refuseIf(!direction.is_none() || !lateral.is_none(),
+                 "direction, lateral: need the place of the probe: give face too");
+        return std::nullopt;
+    }
+    const Vec3 at = vec3Of(face, "face");
+    refuseIf(!(glm::length(at) <= farthestFace), "face: has to be three numbers in metres, within 10 m");
+    const Vec3 inwards = direction.is_none() ? Vec3(0, 1, 0) : vec3Of(direction, "direction");
+    const Vec3 along = lateral.is_none() ? Vec3(1, 0, 0) : vec3Of(lateral, "lateral");
+    refuseIf(!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along)),
+             "direction, lateral: have to be two directions with lengths");
+    return ultrasound::poseOf(at, unit(inwards), unit(along));
+}
+
 py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object& face, const py::object& direction,
                         const py::object& lateral, double depth)
 {
@@ -274,17 +294,10 @@ py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object
     request.height = height;
     request.depth = depth;
     refuseIf(!(depth >= 0), "depth: has to be 0 or more, in metres");
-    if (!face.is_none()) {
-        const Vec3 at = vec3Of(face, "face");
-        refuseIf(!(glm::length(at) <= farthestFace), "face: has to be three numbers in metres, within 10 m");
-        const Vec3 inwards = vec3Of(direction, "direction"), along = vec3Of(lateral, "lateral");
-        refuseIf(!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along)),
-                 "direction, lateral: have to be two directions with lengths");
-        request.pose = ultrasound::poseOf(at, unit(inwards), unit(along));
-    }
+    request.pose = poseOfProbe(face, direction, lateral);
     UltrasoundPicture picture;
     {
-        const py::gil_scoped_release others;
+        const Unlocked others;
         const LiveSession::Use use(box.live);
         if (!box.ultrasound) {
             box.ultrasound = std::make_unique<LiveUltrasound>(box.live.modelled().model);
@@ -389,10 +402,11 @@ void bindSession(py::module_& module)
     const auto held = py::arg("buttons") = haptics::buttonDeadMan;
     const auto isFresh = py::arg("fresh") = true;
     py::class_<SessionBox>(module, "Session")
-        .def(py::init([](const py::object& scene, const std::optional<std::filesystem::path>& record,
-                         const std::string& operatorName) {
-                 const auto modelled = modelOf(scene);
-                 return std::make_unique<SessionBox>(modelled, record ? record->string() : "", operatorName);
+        .def(py::init([](const py::object& scene, const py::object& record, const py::object& operatorName) {
+                 const std::string file = record.is_none() ? "" : pathOf(record, "record").string();
+                 refuseIf(file.empty() && !record.is_none(), "record: is empty: give a file, or None for no record");
+                 const std::string name = wordOf(operatorName, "operator");
+                 return std::make_unique<SessionBox>(modelOf(scene), file, name);
              }),
              py::arg("scene"), py::arg("record") = py::none(), py::arg("operator") = "")
         .def("step", &step, py::arg("pose"), py::arg("buttons") = haptics::buttonDeadMan, py::arg("fresh") = true)
@@ -401,13 +415,13 @@ void bindSession(py::module_& module)
         .def("perform", &perform, py::arg("trainee") = "script", py::arg("seed") = 1, py::arg("seconds") = 120.0)
         .def("close",
              [](SessionBox& box) {
-                 const py::gil_scoped_release others;
+                 const Unlocked others;
                  box.live.close();
              })
         .def("__enter__", [](const py::object& self) { return self; })
         .def("__exit__",
              [](SessionBox& box, const py::args&) {
-                 const py::gil_scoped_release others;
+                 const Unlocked others;
                  box.live.close();
              })
         .def("score",
@@ -417,8 +431,8 @@ void bindSession(py::module_& module)
                  return toPython(session::scoreFigures(figures.score, figures.losses));
              })
         .def("ultrasound", &ultrasoundOf, py::arg("width") = 640, py::arg("height") = 640, py::kw_only(),
-             py::arg("face") = py::none(), py::arg("direction") = py::make_tuple(0, 1, 0),
-             py::arg("lateral") = py::make_tuple(1, 0, 0), py::arg("depth") = 0.0)
+             py::arg("face") = py::none(), py::arg("direction") = py::none(), py::arg("lateral") = py::none(),
+             py::arg("depth") = 0.0)
         .def_property_readonly("events", &eventsOf)
         .def_property_readonly("cores", &coresOf)
         .def_property_readonly("displacement", &displacementOf)

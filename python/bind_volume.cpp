@@ -26,7 +26,6 @@ namespace {
 using Path = std::filesystem::path;
 using Labels = py::array_t<std::uint16_t, py::array::f_style | py::array::forcecast>;
 using Image = py::array_t<float, py::array::f_style | py::array::forcecast>;
-using Matrix = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 std::unique_ptr<VolumeBox> boxed(volume::Tissue tissue, Path file = {})
 {
@@ -43,16 +42,16 @@ volume::TissueTable tableOf(const Path& file)
 
 std::unique_ptr<VolumeBox> open(const Path& file)
 {
-    const py::gil_scoped_release others;
+    const Unlocked others;
     return boxed(session::loadVolume(file), std::filesystem::absolute(file));
 }
 
-std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, double voxel, const Path& tissues,
+std::unique_ptr<VolumeBox> phantom(const std::string& name, const py::object& seed, double voxel, const Path& tissues,
                                    const py::kwargs& parameters)
 {
     datasets::PhantomSpec spec;
     spec.name = name;
-    spec.seed = seed;
+    spec.seed = seedOf(seed, "seed");
     spec.voxel = voxel;
     for (const auto& [key, value] : parameters) {
         const auto parameter = py::str(key).cast<std::string>();
@@ -65,18 +64,16 @@ std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, 
             throw py::type_error(parameter + ": give a number or a word, not " + py::repr(value).cast<std::string>());
         }
     }
-    const py::gil_scoped_release others;
+    const Unlocked others;
     return boxed(datasets::makePhantom(spec, tableOf(tissues)));
 }
 
 // RAS and LPS differ in the sign of x and y.
-volume::Affine affineOf(const Matrix& matrix, const std::string& frame)
+volume::Affine affineOf(const py::object& given, const std::string& frame)
 {
-    if (!matrix) {
-        PyErr_Clear();
-    }
-    refuseIf(!matrix || matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4,
-             "affine: give 4 x 4 numbers, voxel index to patient, in metres");
+    constexpr const char* wanted = "give 4 x 4 numbers, voxel index to patient, in metres";
+    const Doubles matrix = doublesOf(given, "affine", wanted);
+    refuseIf(matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4, "affine: ", wanted);
     refuseIf(frame != "LPS" && frame != "RAS", "frame: is LPS or RAS, not ", frame);
     const auto at = matrix.unchecked<2>();
     for (int column = 0; column < 4; ++column) {
@@ -179,6 +176,17 @@ Labels labelArray(const py::array& given)
     return Labels(given);
 }
 
+Image imageArray(const py::array& given)
+{
+    const bool isNumbers = std::string_view("biufO").find(given.dtype().kind()) != std::string_view::npos;
+    auto values = isNumbers ? Image::ensure(given) : Image();
+    if (!isNumbers || !values) {
+        PyErr_Clear();
+        throw py::value_error("image: give an array of numbers, not of " + py::str(given.dtype()).cast<std::string>());
+    }
+    return values;
+}
+
 // A unit that is only nearly HU would leave out every check that is made of Hounsfield units.
 void checkUnit(const std::string& unit)
 {
@@ -192,17 +200,13 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
     const Labels labels = labelArray(arrayOf(given, "labels"));
     volume::LabelImage map;
     map.size = {static_cast<int>(labels.shape(0)), static_cast<int>(labels.shape(1)), static_cast<int>(labels.shape(2))};
-    map.affine = affineOf(Matrix::ensure(arrayOf(affine, "affine")), frame);
+    map.affine = affineOf(affine, frame);
     map.values.assign(labels.data(), labels.data() + labels.size());
     checkGrid(map);
     std::optional<volume::CompanionImage> companion;
     refuseIf(image.is_none() && !unit.empty(), "image_unit: needs the image: give image too");
     if (!image.is_none()) {
-        const auto values = Image::ensure(arrayOf(image, "image"));
-        if (!values) {
-            PyErr_Clear();
-            throw py::value_error("image: give an array of numbers");
-        }
+        const Image values = imageArray(arrayOf(image, "image"));
         refuseIf(values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape()),
                  "image: has to have the shape of the labels");
         checkUnit(unit);
@@ -213,7 +217,7 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
                  "image: has values that are not finite: give each voxel a number, e.g. with numpy.nan_to_num");
     }
     const auto names = namesOf(tissues);
-    const py::gil_scoped_release others;
+    const Unlocked others;
     return boxed(
         volume::Tissue::fromLabels(map, tableOf(table), names, {{"source", "numpy"}}, companion ? &*companion : nullptr));
 }
@@ -238,7 +242,7 @@ py::dict provenanceOf(const VolumeBox& box)
         if (!out.contains(key)) {
             out[py::str(key)] = py::list();
         }
-        out[py::str(key)].cast<py::list>().append(value);
+        out[py::str(key)].cast<py::list>().append(textOf(value));
     }
     return out;
 }
@@ -261,7 +265,7 @@ py::list tissuesOf(const VolumeBox& box)
     return out;
 }
 
-std::unique_ptr<VolumeBox> import(const Path& path, const std::map<std::string, std::string>& set, const std::string& map,
+std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const std::string& map,
                                   const std::string& defaultTissue, const Path& image, const std::string& imageUnit,
                                   const std::string& stiffnessFrom, double voxel, bool bodyFromImage, double bodyFromHull,
                                   const Path& tissues)
@@ -271,8 +275,9 @@ std::unique_ptr<VolumeBox> import(const Path& path, const std::map<std::string, 
     request.input = path;
     request.mapping.map = map;
     request.mapping.defaultTissue = defaultTissue;
-    for (const auto& [label, tissue] : set) {
-        request.mapping.set.push_back(label + "=" + tissue);
+    for (const auto& [label, tissue] : py::dict(set)) {
+        const std::string name = wordOf(py::str(label), "set");
+        request.mapping.set.push_back(name + "=" + wordOf(tissue, ("set: label " + name).c_str()));
     }
     request.image = image;
     request.imageUnit = imageUnit;
@@ -281,7 +286,7 @@ std::unique_ptr<VolumeBox> import(const Path& path, const std::map<std::string, 
     request.reading.sheared = voxel > 0;
     request.bodyFromImage = bodyFromImage;
     request.hull = bodyFromHull;
-    const py::gil_scoped_release others;
+    const Unlocked others;
     return boxed(prepare::importVolume(request, tableOf(tissues), [](const std::string&, std::optional<double>) {}).tissue);
 }
 
@@ -330,8 +335,7 @@ void bindVolume(py::module_& module)
     const char* const none = "";  // an empty path of Python would be "."
     py::class_<VolumeBox>(module, "Volume")
         .def_static("open", &open, py::arg("file"))
-        .def_static("import_", &import, py::arg("path"), py::kw_only(),
-                    py::arg("set") = std::map<std::string, std::string>(), py::arg("map") = "",
+        .def_static("import_", &import, py::arg("path"), py::kw_only(), py::arg("set") = py::dict(), py::arg("map") = "",
                     py::arg("default_tissue") = "", py::arg("image") = none, py::arg("image_unit") = "",
                     py::arg("stiffness_from") = "", py::arg("voxel") = 0.0, py::arg("body_from_image") = false,
                     py::arg("body_from_hull") = 0.0, py::arg("tissues") = none)
@@ -345,7 +349,7 @@ void bindVolume(py::module_& module)
             [](VolumeBox& box, const Path& file) {
                 base::failIf(file.extension() != ".vdb", "{}: a volume is a .vdb file: name it so", file.native());
                 {
-                    const py::gil_scoped_release others;
+                    const Unlocked others;
                     box.tissue->save(file);
                 }
                 box.file = std::filesystem::absolute(file);
@@ -374,7 +378,7 @@ void bindVolume(py::module_& module)
         .def_property_readonly("provenance", &provenanceOf)
         .def_property_readonly("tissues", &tissuesOf)
         .def_property_readonly("file", [](const VolumeBox& box) -> py::object {
-            return box.file.empty() ? py::object(py::none()) : py::str(box.file.string());
+            return box.file.empty() ? py::object(py::none()) : py::object(textOf(box.file.native()));
         });
     module.def("phantoms", &datasets::phantomNames);
 }

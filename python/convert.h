@@ -2,13 +2,17 @@
 
 // What all bindings share: vectors, errors, arrays that look into memory of ours.
 
+#include <python/unlocked.h>
 #include <volume/geometry.h>
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <nlohmann/json_fwd.hpp>
 
+#include <cstdint>
+#include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::python {
@@ -27,6 +31,21 @@ void refuseIf(bool wrong, const Parts&... why)
 /// A numpy vector of three [as `v`].
 py::array_t<double> vectorOf(Vec3 v);
 
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Numbers as Python's caller gave them, none of which are words or masked. Throws ValueError("NAME: WANTED").
+Doubles doublesOf(const py::handle& given, const char* name, const char* wanted);
+/// Throws ValueError if it is an array with a mask: what that hides would be taken for numbers.
+void refuseMasked(const py::handle& given, const std::string& name);
+/// A whole number from 0 to 2**64 - 1. Throws ValueError or TypeError that names it.
+std::uint64_t seedOf(const py::handle& given, const char* name);
+/// A str of Python in UTF-8. Throws ValueError or TypeError that names it.
+std::string wordOf(const py::handle& given, const char* name);
+/// What os.fspath() makes of it. Throws ValueError or TypeError that names it.
+std::filesystem::path pathOf(const py::handle& given, const char* name);
+/// Text of C++, which may hold the names of files, as Python has those: what is no UTF-8 as surrogates.
+py::str textOf(std::string_view text);
+
 /// Any sequence of three numbers. Throws ValueError that names `what`.
 Vec3 vec3Of(const py::handle& value, const char* what);
 
@@ -37,6 +56,9 @@ py::array readOnlyView(const py::dtype& type, std::vector<py::ssize_t> shape, st
 
 /// Dictionaries, lists, numbers and words of Python.
 py::object toPython(const nlohmann::json& figures);
+
+/// Sets palpate.Error, with the arguments of Python for a program's options.
+void setError(const std::string& message);
 
 /// Takes apart "FILE:LINE: [section] key = value: what is wrong" and throws palpate.SceneError, a ValueError with the
 /// attributes file, line, key.

@@ -14,10 +14,10 @@ PYBIND11_MODULE(_palpate, module)
         } catch (const pybind11::builtin_exception&) {
             throw;  // ValueError and its like are Python's own
         } catch (const std::runtime_error& e) {
-            const auto type = pybind11::module_::import("palpate._errors").attr("Error");
-            PyErr_SetString(type.ptr(), e.what());
+            setError(e.what());
         }
     });
+    waitAtExit();
     bindVolume(module);
     bindScene(module);
     bindSession(module);

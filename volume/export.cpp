@@ -229,10 +229,17 @@ void checkExportName(const std::filesystem::path& file)
     }
 }
 
+void checkCount(const std::filesystem::path& file, std::string_view what, std::size_t values, Index3 size)
+{
+    refuseIf(values != base::countOf(size), file, "{} of {} values do not fit a grid of {} x {} x {}", what, values, size.x,
+             size.y, size.z);
+}
+
 void exportLabels(const std::filesystem::path& file, const LabelImage& image, std::span<const LabelName> names,
                   const ExportOptions& options)
 {
     checkExportName(file);
+    checkCount(file, "labels", image.values.size(), image.size);
     const std::vector<ExportedSegment> segments = segmentsOf(image, names);
     const bool small = segments.empty() || segments.back().label.value < 256;
     VoxelStream voxels{{image.size, image.affine}, small ? Component::u8 : Component::u16, 1, {}};
@@ -253,6 +260,7 @@ void exportImage(const std::filesystem::path& file, const VoxelGrid& grid, std::
                  const ExportOptions& options)
 {
     refuseSegmentation(file);
+    checkCount(file, "an image", values.size(), grid.size);
     const auto slice = static_cast<std::size_t>(grid.size.x) * static_cast<std::size_t>(grid.size.y);
     VoxelStream voxels{grid, Component::f32, 1, {}};
     voxels.slice = [&](int z, int, std::vector<std::byte>& out) {
@@ -265,6 +273,7 @@ void exportVectors(const std::filesystem::path& file, const VoxelGrid& grid, std
                    const ExportOptions& options)
 {
     refuseSegmentation(file);
+    checkCount(file, "vectors", values.size(), grid.size);
     const auto slice = static_cast<std::size_t>(grid.size.x) * static_cast<std::size_t>(grid.size.y);
     VoxelStream voxels{grid, Component::f32, 3, {}};
     voxels.slice = [&](int z, int c, std::vector<std::byte>& out) {

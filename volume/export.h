@@ -40,7 +40,8 @@ std::filesystem::path exportedDataOf(const std::filesystem::path& file);
 /// @param image    the labels
 /// @param names    of labels; those of value 0 and of labels that no voxel has are left out
 /// @param options  version of NIfTI, and who hears how far it is
-/// Throws std::runtime_error ("FILE: what is wrong and what to do").
+/// Throws std::runtime_error ("FILE: what is wrong and what to do"), as the other three do where there is not one value for
+/// each place of the grid.
 void exportLabels(const std::filesystem::path& file, const LabelImage& image, std::span<const LabelName> names,
                   const ExportOptions& options = {});
 
@@ -60,6 +61,7 @@ void exportVectors(const std::filesystem::path& file, const VoxelGrid& grid, std
 /// @param grid    of the nodes
 /// @param tissue  0: no node there (count x 1)
 /// @param u       displacement [m] (count x 3)
+/// Throws std::runtime_error.
 void exportVtu(const std::filesystem::path& file, const NodeGrid& grid, std::span<const std::uint8_t> tissue,
                std::span<const Vec3f> u);
 

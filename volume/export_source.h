@@ -50,6 +50,9 @@ struct ExportedSegment {
     Index3 high{0};
 };
 
+/// Refuses values that are not one for each of the grid's places.
+void checkCount(const std::filesystem::path& file, std::string_view what, std::size_t values, Index3 size);
+
 /// Writes all slices; where `planar`, one component after the other.
 void writeSlices(OutputFile& out, const VoxelStream& voxels, bool planar, const ExportOptions& options);
 

@@ -76,6 +76,8 @@ Mesh meshOf(const NodeGrid& grid, std::span<const std::uint8_t> tissue, std::spa
 void exportVtu(const std::filesystem::path& file, const NodeGrid& grid, std::span<const std::uint8_t> tissue,
                std::span<const Vec3f> u)
 {
+    checkCount(file, "tissue", tissue.size(), grid.size);
+    checkCount(file, "displacements", u.size(), grid.size);
     const Mesh mesh = meshOf(grid, tissue, u);
     Appended arrays;
     std::string xml =

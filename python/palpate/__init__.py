@@ -9,6 +9,9 @@ y to the back, z to the head). docs/python.md is the tutorial.
     >>> ticks["tissue_force"]               # n x 3 [N]
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from . import _palpate
 from ._errors import Error, SceneError
 from ._palpate import (
@@ -34,6 +37,9 @@ from ._record import Record, score
 from ._studies import accuracy
 from ._sweep import SweepResult, merge, sweep, sweep_outputs
 
+if TYPE_CHECKING:
+    from . import envs as envs
+
 __version__: str = _palpate.build.split()[1]
 build: str = _palpate.build  #: version and commit of the C++ side
 
@@ -42,3 +48,13 @@ __all__ = [
     "TICK_SECONDS", "Tick", "UNMARK", "Volume", "WARNINGS", "accuracy", "build", "merge", "phantoms", "plan", "press_path",
     "scenes", "score", "sweep", "sweep_outputs",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "envs":  # is imported when it is first asked for, and gymnasium with it
+        return importlib.import_module(f"{__name__}.envs")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), "envs"})

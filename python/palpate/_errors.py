@@ -7,6 +7,44 @@ _KEY = re.compile(r"^(?:\[+(?P<section>[^\]]+)\]+ )?(?:(?P<who>'[^']*':) )?(?P<k
 _QUOTED = re.compile(r"key '(?P<key>[^']+)'")
 
 
+# What messages advise to users of the programs, and what it is in Python; advice that Python has not is left out.
+_IN_PYTHON = [(re.compile(pattern), ours) for pattern, ours in [
+    (r"--trainee (\S+) takes a biopsy(.*), or add --palpate", r'the trainee "\1" takes a biopsy\2, or give "script"'),
+    (r"--trainee (\S+) holds a needle(.*): leave --trainee away", r'the trainee "\1" holds a needle\2: give "script"'),
+    (r"give --map NAME \(one that --list-maps lists, or a TOML file\), --names FILE \([^)]*\), --set NAME=TISSUE, or "
+     r"--default-tissue NAME; --write-map FILE begins a label map",
+     'give map=NAME (of a built-in map, or a TOML file), set={NAME: TISSUE} or default_tissue=NAME'),
+    (r"; 'palpate import --list-maps' lists them", ": `palpate import --list-maps` lists them"),
+    (r"--map (\w+) \(", r'map="\1" ('),
+    (r"add --any-build", "give any_build=True"),
+    (r"give their folders after --merge", "give their folders"),
+    (r", or go on with --anyway", ""),
+    (r", or --crop\b", ""),
+    (r"--target NAME", "target=NAME (Scene.for_volume)"),
+    (r"(?:add|give) --image FILE", "give image=FILE"),
+    (r"(?:add|give) --image-unit HU", 'give image_unit="HU"'),
+    (r"(?:add|give) --voxel MM", "give voxel=, in metres"),
+    (r"with --body-from-hull MM", "with body_from_hull=, in metres"),
+]]
+_ARGUMENTS = {"set", "map", "default-tissue", "image", "image-unit", "stiffness-from", "voxel", "body-from-image", "body-from-hull",
+              "tissues", "trainee"}
+_OPTION = re.compile(r"(?<![\w/-])(?<!palpate import )--([a-z]+(?:-[a-z]+)*)")
+_OF_IMPORT = re.compile(r"(?<!palpate import )--(volume|image-volume|series|axes|image-axes|dicom-labels|round|renumber|overlap|"
+                        r"threshold|names|crop)\b")
+
+
+def in_python(message: str) -> str:
+    """What a program says, with the arguments of Python for its options."""
+    if "--" not in message:
+        return message
+    for pattern, ours in _IN_PYTHON:
+        message = pattern.sub(ours, message)
+    message = _OPTION.sub(lambda m: m[1].replace("-", "_") if m[1] in _ARGUMENTS else m[0], message)
+    if _OF_IMPORT.search(message):
+        message += " (an option of `palpate import`, whose .vdb Volume.open reads)"
+    return message
+
+
 class Error(RuntimeError):
     """Something that was asked for could not be done."""
 
@@ -32,6 +70,7 @@ class SceneError(Error, ValueError):
 
 def scene_error(message: str) -> SceneError:
     """The SceneError of a message "FILE:LINE: [section] key = value: what is wrong"."""
+    message = in_python(message)
     place = _PLACE.match(message)
     rest = place["rest"] if place else message
     quoted, key = _QUOTED.search(rest), _KEY.match(rest)

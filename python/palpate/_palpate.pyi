@@ -27,7 +27,7 @@ class Volume:
     def import_(
         path: _Path,
         *,
-        set: Mapping[str, str] = ...,
+        set: Mapping[int | str, str] = ...,
         map: str = "",
         default_tissue: str = "",
         image: _Path = "",
@@ -42,7 +42,7 @@ class Volume:
 
         Args:
             path: file or folder.
-            set: {label's name or value: tissue}.
+            set: {label's name or value: tissue}; values as int or str.
             map: a built-in label map's name, or a TOML file.
             default_tissue: of labels that nothing else names.
             image: CT or MR of the same patient, on any grid.
@@ -84,7 +84,8 @@ class Volume:
         """A volume of an array of labels. The array is copied.
 
         Args:
-            labels: whole numbers, 0 to 65535, (i, j, k); 0 without a tissue is outside.
+            labels: whole numbers, 0 to 65535, (i, j, k); 0 without a tissue is outside. No tool enters the body within 3 voxels
+                of the array's border, where it may be cut: leave 4 voxels of 0 around it (numpy.pad, and move the origin).
             affine: 4 x 4, voxel index to patient [m]. nibabel's is in mm: multiply its first three rows by 1e-3. Axes are at right
                 angles, voxels of 1 um to 10 m, and all places within 10 m of the origin.
             tissues: {value: tissue} or {value: (structure's name, tissue)} for every value that is there.
@@ -94,7 +95,7 @@ class Volume:
             table: tissue table (.toml) in place of the built-in one.
 
         Raises:
-            ValueError: shapes, types, the affine or the frame are not right; an array has a mask.
+            ValueError: shapes, types, the affine or the frame are not right; an array has a mask, or is not of numbers.
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:
@@ -148,8 +149,9 @@ class Scene:
         """The standard biopsy of a volume's first tumour, or of the structure `target`. Raises palpate.Error."""
     def changed(self, keys: Mapping[str, Any]) -> Scene:
         """The scene with keys set, written with dots or nested: {"tissue.fat.youngs_kpa": 10, "tool": {"radius_mm": 7}}. Where they
-        change the volume, it is read or made again. One in memory alone follows keys of tissues, and no others.
-        Raises palpate.SceneError."""
+        change the volume, it is read or made again. One in memory alone follows keys of tissues, and no others. A list of
+        dictionaries replaces all of vital, insert or script: {"vital": [{"name": "artery"}]}.
+        Raises palpate.SceneError; ValueError for a point that is none and for masked values."""
     def to_dict(self) -> dict[str, Any]: ...
     @property
     def name(self) -> str: ...
@@ -289,9 +291,9 @@ class Session:
             operator: who holds the tool, or a pseudonym, for the record.
 
         Raises:
-            palpate.SceneError, palpate.Error
+            palpate.SceneError, palpate.Error. ValueError, TypeError: record or operator is no name.
         """
-    def step(self, pose: ArrayLike, buttons: int = ..., fresh: bool = True) -> Tick:
+    def step(self, pose: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = True) -> Tick:
         """One tick: a millisecond, unless Model.rate is another.
 
         Args:
@@ -302,7 +304,7 @@ class Session:
             fresh: False says that the device had no new pose.
 
         Raises:
-            ValueError: the pose is none. palpate.Error: the session is closed, or at work in another thread.
+            ValueError: the pose is none, or buttons or fresh as run() refuses them. palpate.Error: the session is closed, or at work in another thread.
         """
     def run(self, poses: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = ...) -> NDArray[np.void]:
         """A tick for each pose; the GIL is released. The same poses give the same bits as step() and `palpate replay`.
@@ -328,7 +330,7 @@ class Session:
 
         Returns:
             rows as run(). Raises palpate.Error where tool, task and trainee do not go together or Model.rate is not 1000,
-            ValueError for seconds below 0.
+            ValueError for seconds below 0 and for a seed below 0.
         """
     def close(self) -> None:
         """Ends the record. Raises palpate.Error when it is not whole (a full disk) or not there (removed or moved)."""
@@ -342,8 +344,8 @@ class Session:
         height: int = 640,
         *,
         face: ArrayLike | None = None,
-        direction: ArrayLike = ...,
-        lateral: ArrayLike = ...,
+        direction: ArrayLike | None = None,
+        lateral: ArrayLike | None = None,
         depth: float = 0.0,
     ) -> dict[str, Any]:
         """The B-mode picture of the deformed body.
@@ -351,7 +353,7 @@ class Session:
         Args:
             width, height: pixels, 16 to 8192.
             face: middle of the probe's face (3) [m]; None: where the scene has the probe, else as the viewer places it.
-            direction, lateral: into the body, and along the face (3 each).
+            direction, lateral: into the body, and along the face (3 each), with `face` alone; None: (0, 1, 0) and (1, 0, 0).
             depth: of the picture [m], what the probe has; 0: its own.
 
         Returns:
@@ -370,7 +372,7 @@ class Session:
             curved probe at a = (radius + z) * sin(l), b = (radius + z) * cos(l) - radius.
 
         Raises:
-            ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size, a depth that
+            ValueError: no point or direction, or a direction without `face` or length, both along each other, a depth below 0. palpate.Error: the size, a depth that
                 the probe does not have.
         """
     @property
@@ -383,7 +385,8 @@ class Session:
     def displacement(self) -> NDArray[np.float32]:
         """Of the lattice's nodes (nx, ny, nz, 3) [m]: a read-only view that follows the session; copy it to keep a moment."""
     @property
-    def interrupted(self) -> NDArray[np.void] | None: ...
+    def interrupted(self) -> NDArray[np.void] | None:
+        """Rows of the last run() or perform(), where an exception (Ctrl-C) ended it; else None. advance() has none."""
     @property
     def model(self) -> Model: ...
     @property

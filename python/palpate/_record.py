@@ -158,8 +158,10 @@ class Record:
         return self._file.replay()
 
 
-def score(what: Record | Session | str | os.PathLike[str]) -> dict[str, Any]:
+def score(what: Record | Session | str | bytes | os.PathLike[str]) -> dict[str, Any]:
     """The score of a Record, of a record's file, or of a Session so far: a dict by the keys of docs/score.md."""
-    if isinstance(what, (str, os.PathLike)):
+    if isinstance(what, (Record, Session)):
+        return what.score()
+    if isinstance(what, (str, bytes, os.PathLike)):
         return RecordFile(os.fspath(what)).score()
-    return what.score()
+    raise TypeError(f"score: give a Record, its file or a Session, not {what!r}")

@@ -117,11 +117,6 @@ def _number(text):
     return float(text) if number[1] or number[2] else int(text)
 
 
-def _in_python(message):
-    """What the program says, with the arguments of Python for its options."""
-    return message.replace("add --any-build", "give any_build=True").replace("give their folders after --merge", "give their folders")
-
-
 def _jobs(jobs):
     if jobs is None:
         return os.cpu_count() or 1
@@ -134,10 +129,22 @@ def _jobs(jobs):
     return number
 
 
+def _told(line):
+    """What the process that runs the cases says: a JSON object."""
+    try:
+        said = json.loads(line)
+    except ValueError:
+        said = None
+    if not isinstance(said, dict):
+        raise Error(f"sweep: the process that runs the cases said {line.strip()!r}: a module of Python in it prints")
+    return said
+
+
 def _work(folder, plan, progress, **job):
     """Runs the sweep in a process of its own, which forks: this one may have threads."""
     package = pathlib.Path(__file__).resolve().parent
-    environment = dict(os.environ, OPENBLAS_NUM_THREADS="1")
+    # With a safe path, no file of the working folder is taken for a module (json.py).
+    environment = dict(os.environ, OPENBLAS_NUM_THREADS="1", PYTHONSAFEPATH="1")
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, (str(package.parent), os.environ.get("PYTHONPATH"))))
     text = json.dumps({"folder": os.fspath(folder), "plan": plan, **job})
     worker = subprocess.Popen([sys.executable, "-m", "palpate._sweep_worker", text], stdout=subprocess.PIPE, text=True,
@@ -145,7 +152,7 @@ def _work(folder, plan, progress, **job):
     last = None
     try:
         for line in worker.stdout:
-            last = json.loads(line)
+            last = _told(line)
             if progress is not None and "done" in last:
                 progress(last["done"], last["of"])
     except BaseException:
@@ -156,7 +163,7 @@ def _work(folder, plan, progress, **job):
         worker.stdout.close()
     status = worker.wait()
     if last is not None and "error" in last:
-        raise Error(_in_python(last["error"]))
+        raise Error(last["error"])
     if status != 0:
         raise Error(f"sweep: the process that runs the cases ended with status {status}")
 
@@ -236,8 +243,5 @@ def merge(folder, shards=(), *, any_build=False):
         palpate.Error: there are no shards, or they are of another plan or of different builds.
     """
     _need_sweeps()
-    try:
-        _palpate.merge_shards(os.fspath(folder), [os.fspath(shard) for shard in shards], bool(any_build))
-    except Error as error:
-        raise Error(_in_python(str(error))) from None
+    _palpate.merge_shards(os.fspath(folder), [os.fspath(shard) for shard in shards], bool(any_build))
     return SweepResult(folder)

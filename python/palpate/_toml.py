@@ -15,6 +15,8 @@ def _value(value):
     if isinstance(value, numbers.Real):
         return repr(float(value))
     if isinstance(value, (str, os.PathLike)):
+        if "\0" in os.fspath(value):
+            raise ValueError(f"{value!r} holds a NUL character, which no name has")
         return json.dumps(os.fspath(value), ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_value(v) for v in value) + "]"
@@ -22,6 +24,7 @@ def _value(value):
 
 
 def _key(key):
+    key = str(key)
     return key if key.replace("_", "").replace("-", "").isalnum() and key.isascii() else json.dumps(key, ensure_ascii=False)
 
 
@@ -48,4 +51,6 @@ def dumps(table):
     """TOML text of nested dictionaries; lists of dictionaries become arrays of tables."""
     lines = []
     _table(table, (), lines)
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    text.encode()  # half a character is a ValueError
+    return text

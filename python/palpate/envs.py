@@ -281,8 +281,11 @@ def _across(line):
     return side, np.cross(line, side)
 
 
-def _serve(pipe, make, numbers, seed):
-    """The life of a worker process: its environments, stepped when asked."""
+def _serve(pipe, make, numbers, seed, inherited):
+    """The life of a worker process: its environments, stepped when asked. It ends with its parent, whose ends of the pipes a
+    forked process has `inherited`."""
+    for one in inherited:
+        one.close()
     try:
         envs = [make() for _ in numbers]
         children = np.random.SeedSequence(seed)
@@ -360,7 +363,9 @@ class Vector:
         try:
             for part in self._parts:
                 here, there = start.Pipe()
-                process = start.Process(target=_serve, args=(there, make, [int(n) for n in part], seed), daemon=True)
+                inherited = [*self._pipes, here] if start.get_start_method() == "fork" else []
+                arguments = (there, make, [int(n) for n in part], seed, inherited)
+                process = start.Process(target=_serve, args=arguments, daemon=True)
                 process.start()
                 there.close()
                 self._pipes.append(here)

@@ -159,6 +159,36 @@ TEST(PlanApproach, SaysWhenThereIsNoWay)
     }
 }
 
+// A cube of fat with a lump in its middle, so many voxels of air from the border on all sides.
+Tissue cubeInAir(int air)
+{
+    volume::LabelImage image;
+    image.size = Index3(20 + 2 * air);
+    image.affine.linear = Mat3(2e-3);
+    volume::forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
+        const int inside =
+            std::min({n.x, n.y, n.z, image.size.x - 1 - n.x, image.size.y - 1 - n.y, image.size.z - 1 - n.z});
+        image.values.push_back(static_cast<std::uint16_t>(inside < air ? 0 : inside < air + 7 ? 1 : 2));
+    });
+    return Tissue::fromLabels(image, defaultTissues(),
+                              std::vector<volume::LabelName>{{1, "fat", "fat"}, {2, "lump", "ilc"}}, {});
+}
+
+TEST(PlanApproach, NeedsThreeVoxelsOfAirToTheBorderAndSaysSo)
+{
+    const Scene scene = sceneForVolume("cube.vdb", cubeInAir(3));
+    EXPECT_NO_THROW(planApproach(scene, cubeInAir(3)));
+    try {
+        planApproach(scene, cubeInAir(2));
+        FAIL() << "took a cut for skin";
+    } catch (const std::runtime_error& e) {
+        EXPECT_NE(std::string(e.what()).find("go out within 3 voxels of the volume's border"), std::string::npos)
+            << e.what();
+        EXPECT_NE(std::string(e.what()).find("add 4 voxels of air"), std::string::npos) << e.what();
+        EXPECT_EQ(std::string(e.what()).find("bone"), std::string::npos) << e.what();
+    }
+}
+
 TEST(SceneForVolume, NamesItsTargetAndVitalStructures)
 {
     Scene breast = *builtInScene("breast");

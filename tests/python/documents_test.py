@@ -57,5 +57,17 @@ class Stubs(unittest.TestCase):
                 self.assertGreater(len((thing.__doc__ or "").split()), 4, name)
 
 
+class Package(unittest.TestCase):
+    def test_environments_are_there_when_they_are_asked_for(self):
+        code = """
+import sys, palpate
+assert "palpate.envs" not in sys.modules
+assert "envs" in dir(palpate)
+print(palpate.envs.Biopsy.__name__, hasattr(palpate, "nothing"))
+"""
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        self.assertEqual((done.stdout, done.stderr), ("Biopsy False\n", ""))
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -1,7 +1,9 @@
 import functools
 import importlib.util
 import os
+import pathlib
 import signal
+import subprocess
 import sys
 import time
 import types
@@ -271,6 +273,13 @@ class BrokenVectors(unittest.TestCase):
                 call()
 
 
+def is_alive(pid):
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
 class Vectors(unittest.TestCase):
     def test_episodes_do_not_depend_on_the_number_of_processes(self):
         actions = np.random.default_rng(1).uniform(-1, 0.4, (30, 3, 4))
@@ -296,6 +305,28 @@ class Vectors(unittest.TestCase):
             self.assertEqual(observations[:, 15].tolist(), [1, 1])
             self.assertEqual([i["final_observation"][15] for i in infos], [0, 0])
             self.assertFalse(np.array_equal(first, observations))
+
+    def test_forked_processes_end_with_their_parent(self):
+        code = """
+import os, signal, time
+from envs_test import envs, make
+vector = envs.Vector(2, make, processes=2, seed=1, context="fork")
+vector.reset()
+print(*[process.pid for process in vector._processes], flush=True)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+        done = subprocess.run([sys.executable, "-B", "-c", code], stdout=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, -signal.SIGKILL)
+        left = [int(pid) for pid in done.stdout.split()]
+        self.assertEqual(len(left), 2)
+        for _ in range(1000):
+            left = [pid for pid in left if is_alive(pid)]
+            if not left:
+                return
+            time.sleep(0.02)
+        for pid in left:
+            os.kill(pid, signal.SIGKILL)
+        self.fail("processes are left behind")
 
     def test_counts_that_are_none_are_refused(self):
         for name, arguments in {"count": lambda v: ((v, make), {}), "processes": lambda v: ((2, make), {"processes": v})}.items():

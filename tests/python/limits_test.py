@@ -5,6 +5,8 @@ import multiprocessing
 import os
 import pathlib
 import signal
+import subprocess
+import sys
 import threading
 import time
 import unittest
@@ -190,10 +192,12 @@ class Interrupts(unittest.TestCase):
             session.run(poses)
         done = session.ticks
         self.assertTrue(0 < done < len(poses))
-        self.assertEqual(len(session.interrupted), done)
+        first = session.interrupted
+        self.assertEqual(len(first), done)
         rest = session.run(poses[done:done + 500])
         whole = palpate.Session(small_block()).run(poses[:done + 500])
-        np.testing.assert_array_equal(np.concatenate([session.interrupted, rest]), whole)
+        np.testing.assert_array_equal(np.concatenate([first, rest]), whole)
+        self.assertIsNone(session.interrupted)
 
     def test_an_interrupted_hand_has_done_whole_ticks(self):
         session = palpate.Session("layered")
@@ -216,6 +220,49 @@ class Interrupts(unittest.TestCase):
         signal.setitimer(signal.ITIMER_REAL, 0.2)
         with self.assertRaises(Enough):
             palpate.Session(small_block()).run(wander(60000))
+
+
+ENDS = """
+import atexit, sys, threading, time
+import palpate
+from common import small_block, wander
+session = palpate.Session(small_block(), record={record!r})
+poses = wander(200000)
+begun = threading.Event()
+def work():
+    while True:
+        begun.set()
+        {work}
+threading.Thread(target=work, daemon=True).start()
+begun.wait()
+time.sleep(0.3)
+print(session.ticks)
+"""
+
+
+class Ends(InFolder):
+    def test_a_program_may_end_while_threads_that_nobody_waits_for_are_at_work(self):
+        record = str(self.folder / "r.db")
+        for work, file in (("session.run(poses)", None), ("session.advance(poses)", None), ("session.run(poses)", record),
+                           ("session.perform('script', seconds=0)", None), ("session.step(poses[0])", None),
+                           ("palpate.Volume.phantom('block', voxel=2e-3)", None)):
+            with self.subTest(work, record=file):
+                done = subprocess.run([sys.executable, "-B", "-c", ENDS.format(work=work, record=file)], capture_output=True,
+                                      text=True, timeout=300)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertTrue(palpate.Record(record).complete)
+
+    def test_a_forked_process_does_not_wait_for_threads_that_it_has_not(self):
+        text = ENDS.format(work="session.run(poses)", record=None) + """
+import os
+child = os.fork()
+if child == 0:
+    atexit._run_exitfuncs()
+    os._exit(0)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+        done = subprocess.run([sys.executable, "-B", "-c", text], capture_output=True, text=True, timeout=300)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
 
 
 if __name__ == "__main__":

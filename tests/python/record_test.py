@@ -138,6 +138,17 @@ lateral = [1, 0, 0]
             palpate.Session(small_block(), record=self.file)
         self.assertEqual(len(palpate.Record(self.file)), 2000)
 
+    def test_a_score_is_of_what_a_file_may_be_called(self):
+        self.assertEqual(palpate.score(str(self.file).encode())["total"], palpate.score(self.file)["total"])
+        odd = self.folder / "r\udce4.db"
+        self.file.rename(odd)
+        self.assertEqual(palpate.Record(odd).file, str(odd))
+        with self.assertRaisesRegex(palpate.Error, "none\udce4.db: "):
+            palpate.score(self.folder / "none\udce4.db")
+        for wrong in (3, None):
+            with self.assertRaisesRegex(TypeError, "score: give a Record"):
+                palpate.score(wrong)
+
     def test_what_is_no_record_is_refused(self):
         (self.folder / "no.db").write_text("no record")
         with self.assertRaisesRegex(palpate.Error, "no.db"):

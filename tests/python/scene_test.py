@@ -63,6 +63,41 @@ class Scenes(InFolder):
         with self.assertRaisesRegex(palpate.SceneError, "TOML"):
             palpate.Scene.parse("name = ")
 
+    def test_names_that_are_no_text_are_value_errors(self):
+        for wrong in ("block\udc80", "block\0x"):
+            with self.subTest(wrong):
+                for call in (lambda: palpate.Scene(wrong), lambda: palpate.Scene(volume={"phantom": wrong}),
+                             lambda: palpate.Scene("block").changed({"volume.phantom": wrong})):
+                    with self.assertRaises(ValueError) as caught:
+                        call()
+                    self.assertNotIn("\n", str(caught.exception))
+        with self.assertRaises(palpate.SceneError):
+            palpate.Scene(volume={1: 2})
+
+    def test_values_with_a_mask_and_words_are_no_numbers(self):
+        masked = np.ma.array([3.0, 4.0, 5.0], mask=[False, True, False])
+        for keys in ({"tissue.fat.youngs_kpa": masked[1]}, {"target.aim_mm": masked}):
+            with self.subTest(keys), self.assertRaisesRegex(ValueError, "is a masked array"):
+                palpate.Scene("block").changed(keys)
+        for point in (["1", "2", "3"], np.array(["1", "2", "3"]), [1j, 2, 3]):
+            with self.subTest(point), self.assertRaisesRegex(ValueError, "target.aim_mm: give three numbers"):
+                palpate.Scene("block").changed({"target.aim_mm": point})
+
+    def test_lists_of_tables_are_replaced_as_a_whole(self):
+        scene = palpate.Scene("breast")
+        self.assertGreater(len(scene.to_dict()["vital"]), 1)
+        one = palpate.Scene(scene, vital=[{"name": "artery", "warn_mm": 3}], tool={"radius_mm": 0.9})
+        self.assertEqual([(v["name"], v["warn_mm"]) for v in one.to_dict()["vital"]], [("artery", 3)])
+        self.assertEqual(one.to_dict()["tool"]["radius_mm"], 0.9)
+        self.assertNotIn("vital", scene.changed({"vital": []}).to_dict())
+        rest = one.to_dict()
+        rest["vital"], rest["tool"]["radius_mm"] = scene.to_dict()["vital"], scene.to_dict()["tool"]["radius_mm"]
+        self.assertEqual(rest, scene.to_dict())
+        with self.assertRaisesRegex(palpate.SceneError, "name is missing"):
+            scene.changed({"vital": [{"nam": "artery"}]})
+        with self.assertRaisesRegex(palpate.SceneError, "at the top of a scene"):
+            scene.changed({"tool.vital": [{"name": "artery"}]})
+
 
 def lump_in_fat():
     """A volume in memory, 66 x 45 x 66 mm, with its skin at y = 0."""

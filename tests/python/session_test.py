@@ -119,6 +119,11 @@ class Run(InFolder):
             ("pose: give", lambda: session.step(np.zeros(3, complex))),
             *(("buttons", lambda b=b: session.run(np.zeros((4, 3)), buttons=b))
               for b in (2**40, -1, 1.7, np.nan, "1", None, [1, 1, 1, 2**32], 2**70)),
+            *(("buttons: give", lambda b=b: session.step(np.zeros(3), buttons=b))
+              for b in (2**40, -1, 1.7, np.nan, "1", None, [1, 1], 2**70)),
+            *(("fresh: give", lambda f=f: session.step(np.zeros(3), fresh=f)) for f in ("False", np.nan, 2, -1, None)),
+            ("pose: give", lambda: session.step(["0", "0", "0"])),
+            ("seed: give", lambda: session.perform(seed=-1)),
             *(("fresh", lambda f=f: session.run(np.zeros((4, 3)), fresh=f)) for f in ("False", np.nan, 2, None)),
             ("seconds", lambda: session.perform(seconds=np.nan)),
             ("seconds", lambda: session.perform(seconds=-1)),
@@ -129,6 +134,18 @@ class Run(InFolder):
                 call()
         self.assertEqual(session.ticks, 0)
         self.assertEqual(len(session.run(np.zeros((0, 3)))), 0)
+
+    def test_a_step_takes_buttons_as_a_run_does(self):
+        for given in (np.uint32(3), 3.0, [3], np.array(3), True):
+            tick = palpate.Session(small_block()).step([0, -0.02, 0], buttons=given, fresh=np.bool_(True))
+            row = palpate.Session(small_block()).run([[0, -0.02, 0]], buttons=given)[0]
+            self.assertEqual((tick.buttons, tick.fresh), (row["buttons"], row["fresh"]))
+
+    def test_names_that_are_none_are_refused_in_one_line(self):
+        for wrong in ({"record": ""}, {"record": "a\0b"}, {"operator": "\udc80"}, {"operator": "a\0b"}, {"record": 3}, {"operator": 3}):
+            name = next(iter(wrong))
+            with self.subTest(wrong), self.assertRaisesRegex((ValueError, TypeError), f"^{name}: [^\n]*$"):
+                palpate.Session(small_block(), **wrong)
 
 
 class Shape(unittest.TestCase):
@@ -178,7 +195,8 @@ class Shape(unittest.TestCase):
         self.assertAlmostEqual(deeper["depth"], 0.03, places=6)
         for wrong in ({"depth": -1}, {"face": [1e9, 0, 0]}, {"face": [np.nan, 0, 0]}, {"face": [np.inf, 0, 0]},
                       {"face": [0, 0, 0], "direction": [np.nan, 1, 0]}, {"face": [0, 0, 0], "direction": [0, 0, 0]},
-                      {"face": [0, 0, 0], "direction": [0, 1, 0], "lateral": [0, 2, 0]}):
+                      {"face": [0, 0, 0], "direction": [0, 1, 0], "lateral": [0, 2, 0]}, {"direction": [0, 0, 0]},
+                      {"lateral": [1, 0, 0]}, {"face": ["0", "0", "0"]}, {"face": np.ma.zeros(3)}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 session.ultrasound(320, 320, **wrong)
         for wrong in (1e9, 1e-9):
@@ -269,6 +287,12 @@ class Hands(InFolder):
         session = palpate.Session(palpate.Scene("block").changed({"model.level": "spring"}))
         with self.assertRaisesRegex(RuntimeError, "trainee 'fool': there are "):
             session.perform("fool")
+
+    def test_a_hand_that_does_not_fit_the_tool_has_no_advice_of_the_program(self):
+        session = palpate.Session(small_block())
+        with self.assertRaisesRegex(palpate.Error, '"expert" takes a biopsy and the tool is no needle') as caught:
+            session.perform("expert")
+        self.assertNotIn("--", str(caught.exception))
 
 
 if __name__ == "__main__":

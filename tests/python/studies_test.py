@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import unittest
+import unittest.mock
 
 import numpy as np
 import pandas
@@ -130,6 +131,23 @@ class Sweeps(InFolder):
         read = palpate.SweepResult(self.folder)["word"]
         self.assertEqual(read, [*words, *numbers.values(), None])
         self.assertEqual([type(v) for v in read[len(words):-1]], [type(v) for v in numbers.values()])
+
+    def test_a_sweep_runs_nothing_that_lies_in_the_folder(self):
+        (self.folder / "json.py").write_text("print('not this')")
+        code = f"""
+import sys
+sys.path.remove("")
+import palpate
+from studies_test import sweep
+print(len(sweep({str(self.folder / "s")!r}, [{{"tissue.fat.youngs_kpa": 4.0}}])))
+"""
+        done = subprocess.run([sys.executable, "-B", "-c", code], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual((done.stdout, done.returncode), ("1\n", 0), done.stderr)
+
+    def test_what_is_no_report_of_the_cases_is_an_error(self):
+        (self.folder / "json.py").write_text("print('not this')")
+        with unittest.mock.patch.dict("os.environ", PYTHONPATH=str(self.folder)), self.assertRaisesRegex(palpate.Error, "'not this'"):
+            sweep(self.folder / "s", [{"tissue.fat.youngs_kpa": 4.0}])
 
     def test_outputs_are_listed(self):
         self.assertIn("force_n", palpate.sweep_outputs()["press"])

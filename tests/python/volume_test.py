@@ -102,6 +102,17 @@ class FromNumpy(InFolder):
             with self.subTest(wrong), self.assertRaisesRegex((ValueError, palpate.Error), wrong):
                 palpate.Volume.from_numpy(labels, affine, tissues)
 
+    def test_images_and_affines_of_what_is_no_number_are_refused(self):
+        image = np.zeros(cube().shape)
+        for given in (image.astype(complex), image.astype(str), np.full(image.shape, np.datetime64("2026-01-01"))):
+            with self.subTest(given.dtype), self.assertRaisesRegex(ValueError, "image: give an array of numbers, not of"):
+                palpate.Volume.from_numpy(cube(), AFFINE, TISSUES, image=given)
+        for given in (AFFINE.astype(complex), AFFINE.astype(str)):
+            with self.subTest(given.dtype), self.assertRaisesRegex(ValueError, "affine: give 4 x 4 numbers"):
+                palpate.Volume.from_numpy(cube(), given, TISSUES)
+        same = palpate.Volume.from_numpy(cube(), AFFINE.astype(object), TISSUES, image=image.astype(object))
+        np.testing.assert_array_equal(same.affine, AFFINE)
+
     def test_an_affine_that_is_none_is_a_value_error(self):
         for origin in ([np.nan] * 3, [18, 0, 0]):
             with self.subTest(origin), self.assertRaises(ValueError):
@@ -197,6 +208,54 @@ class Files(InFolder):
         hull = palpate.Volume.import_(self.folder / "v.nrrd", body_from_hull=5e-3, set={"0": "fat", "3": "idc_high_grade"})
         self.assertIn("invented_skin", [one["name"] for one in hull.info["labels"]])
         self.assertEqual(hull.labels[0, 0, 0], 0)
+
+    def test_labels_may_be_named_by_their_numbers(self):
+        palpate.Volume.from_numpy(cube(), AFFINE, TISSUES).save(self.folder / "v.vdb")
+        program("export", self.folder / "v.vdb", "-o", self.folder / "v.nii.gz")
+        words = palpate.Volume.import_(self.folder / "v.nii.gz", set={"1": "fat", "2": "liver"})
+        numbers = palpate.Volume.import_(self.folder / "v.nii.gz", set={1: "fat", np.uint16(2): "liver"})
+        self.assertEqual(numbers.info["labels"], words.info["labels"])
+        with self.assertRaisesRegex(TypeError, "set: label 1: give a word"):
+            palpate.Volume.import_(self.folder / "v.nii.gz", set={1: None})
+
+    def test_advice_is_of_python(self):
+        palpate.Volume.from_numpy(cube(), AFFINE, {1: "fat", 2: ("x7", "fat")}).save(self.folder / "v.vdb")
+        program("export", self.folder / "v.vdb", "-o", self.folder / "v.nrrd")
+        file = self.folder / "v.nrrd"
+        for says, call in [
+            ("give map=NAME .*, set={NAME: TISSUE} or default_tissue=NAME", lambda: palpate.Volume.import_(file)),
+            ("^voxel -1000mm: must be a length", lambda: palpate.Volume.import_(file, voxel=-1)),
+            ("^body_from_hull -1000mm: must be", lambda: palpate.Volume.import_(file, body_from_hull=-1)),
+            ("^body_from_image: needs the image: give image=FILE$", lambda: palpate.Volume.import_(file, body_from_image=True)),
+            ("^set 9=fat: no voxel", lambda: palpate.Volume.import_(file, set={9: "fat"}, default_tissue="fat")),
+            ("target=NAME", lambda: palpate.Scene(palpate.Volume.from_numpy(cube(), AFFINE, {1: "fat", 2: "fat"}))),
+        ]:
+            with self.subTest(says), self.assertRaisesRegex(palpate.Error, says) as caught:
+                call()
+            self.assertNotIn("--", str(caught.exception).replace(str(file), ""))
+
+    def test_names_of_files_that_are_no_utf_8_stay_as_they_are(self):
+        file = self.folder / "v\udce4.vdb"
+        with self.assertRaisesRegex(palpate.Error, "v\udce4.vdb: "):
+            palpate.Volume.open(file)
+        volume = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES)
+        volume.save(file)
+        self.assertEqual(volume.file, str(file))
+        self.assertEqual(palpate.Volume.open(volume.file).file, str(file))
+
+    def test_a_seed_that_is_none_is_named(self):
+        for seed, error in ((-1, ValueError), (2**64, ValueError), (1.5, TypeError), ("1", TypeError)):
+            with self.subTest(seed), self.assertRaisesRegex(error, "^seed: give a whole number[^\n]*$"):
+                palpate.Volume.phantom("block", seed=seed)
+
+    def test_too_little_air_around_a_body_is_said(self):
+        labels = np.ones((24, 24, 24), np.uint8)
+        labels[9:15, 9:15, 9:15] = 2
+        volume = palpate.Volume.from_numpy(labels, np.diag([2e-3] * 3 + [1]), {1: "fat", 2: ("lump", "idc_high_grade")})
+        with self.assertRaisesRegex(palpate.Error, "border.*add 4 voxels of air"):
+            palpate.Model(palpate.Scene.for_volume(volume).changed({"model.level": "spring"}))
+        padded = palpate.Volume.from_numpy(np.pad(labels, 3), volume.affine, {1: "fat", 2: ("lump", "idc_high_grade")})
+        palpate.Model(palpate.Scene.for_volume(padded).changed({"model.level": "spring"}))
 
     def test_lengths_out_of_bounds_are_refused(self):
         for wrong in ({"voxel": 1.0}, {"voxel": -1e-3}, {"voxel": np.nan}, {"body_from_hull": -5.0},

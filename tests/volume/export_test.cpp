@@ -272,5 +272,37 @@ TEST(Export, RefusesOnOneLineAndLeavesNothing)
     EXPECT_EQ(errorOf(folder / "ct.mhd"), "") << "its own is replaced";
 }
 
+// Writers that trusted the grid read past the end of what they were given.
+TEST(Export, RefusesValuesThatDoNotFitTheGrid)
+{
+    const Folder folder;
+    LabelImage image = voxelise({3, 3, 3}, {Mat3(1e-3), Vec3(0.0)}, [](Vec3) { return 1; });
+    const VoxelGrid grid{image.size, image.affine};
+    const NodeGrid nodes{image.size, Vec3(0.0), 1e-3};
+    const std::vector<std::uint8_t> tissue(27, 1), tissueShort(26, 1);
+    const std::vector<Vec3f> u(27), few(26);
+    image.values.pop_back();
+    const auto refusedBy = [&](const std::string& name, const auto& write) {
+        SCOPED_TRACE(name);
+        try {
+            write(folder / name);
+            ADD_FAILURE() << "was written";
+        } catch (const std::runtime_error& e) {
+            EXPECT_NE(std::string(e.what()).find(name + ": "), std::string::npos) << e.what();
+            EXPECT_NE(std::string(e.what()).find("of 26 values do not fit a grid of 3 x 3 x 3"), std::string::npos)
+                << e.what();
+        }
+    };
+    for (const std::string name : {"a.nii", "a.nrrd", "a.seg.nrrd", "a.mha"}) {
+        refusedBy(name, [&](const auto& file) { exportLabels(file, image, {}); });
+    }
+    refusedBy("i.nii", [&](const auto& file) { exportImage(file, grid, std::vector<float>(26)); });
+    refusedBy("v.nii", [&](const auto& file) { exportVectors(file, grid, few); });
+    refusedBy("t.vtu", [&](const auto& file) { exportVtu(file, nodes, tissueShort, u); });
+    refusedBy("u.vtu", [&](const auto& file) { exportVtu(file, nodes, tissue, few); });
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+    exportVtu(folder / "whole.vtu", nodes, tissue, u);
+}
+
 }  // namespace
 }  // namespace palpate::volume

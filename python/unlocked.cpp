@@ -1,0 +1,73 @@
+#include <python/unlocked.h>
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+namespace palpate::python {
+
+namespace {
+
+// Of the process, as the interpreter is.
+std::atomic<bool> isEnding = false, isAbandoned = false;
+std::atomic<std::thread::id> endingThread;  // has to work to the end
+int unlockedThreads = 0;                    // is changed and read with the GIL held
+
+void waitForThreads()
+{
+    endingThread = std::this_thread::get_id();
+    isEnding = true;
+    while (unlockedThreads > 0 && !isAbandoned) {
+        {
+            const pybind11::gil_scoped_release others;
+            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        if (PyErr_CheckSignals() != 0) {
+            isAbandoned = true;
+            throw pybind11::error_already_set();
+        }
+    }
+}
+
+}  // namespace
+
+Unlocked::Unlocked()
+{
+    if (ending()) {
+        throwEnding();
+    }
+    ++unlockedThreads;
+    thread_ = PyEval_SaveThread();
+}
+
+Unlocked::~Unlocked()
+{
+    while (isAbandoned && ending()) {
+        pause();  // there is nothing to come back to
+    }
+    PyEval_RestoreThread(thread_);
+    --unlockedThreads;
+}
+
+bool ending() noexcept
+{
+    return isEnding && endingThread.load() != std::this_thread::get_id();
+}
+
+void throwEnding()
+{
+    PyErr_SetNone(PyExc_SystemExit);
+    throw pybind11::error_already_set();
+}
+
+void waitAtExit()
+{
+    // A forked process has none of the other threads.
+    pthread_atfork(nullptr, nullptr, [] { unlockedThreads = 0; });
+    pybind11::module_::import("atexit").attr("register")(pybind11::cpp_function(&waitForThreads));
+}
+
+}  // namespace palpate::python
