@@ -15,8 +15,8 @@ TEST(CtRecord, APictureOfItIsAScan)
 {
     const Folder folder;
     const std::string record = folder / "c.db";
-    figures({"train", "ct-core-biopsy", "--setting", "fast", "--model", "spring", "--unpaced", "--no-view", "--seconds",
-             "0.2", "--record", record});
+    figures(
+        {"train", "ct-core-biopsy", "--model", "spring", "--unpaced", "--no-view", "--seconds", "0.2", "--record", record});
     const Outcome outcome =
         palpate({"export", "--record", record, "--at", "0.1s", "--window", "lung", "-o", folder / "a.png"});
     EXPECT_EQ(outcome.status, 0) << outcome.err;

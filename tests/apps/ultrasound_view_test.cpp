@@ -39,8 +39,8 @@ TEST(Ultrasound, ARecordsPictureComesAgainBitForBit)
     expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.png", "--at", "9s"}, "the record runs from");
     expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.png", "--like", threeSeconds()},
                   "is no ultrasound image");
-    figures({"train", "find-lump", "--setting", "fast", "--model", "spring", "--unpaced", "--no-view", "--seconds", "3",
-             "--record", folder / "other.db"});
+    figures({"train", "find-lump", "--model", "spring", "--unpaced", "--no-view", "--seconds", "3", "--record",
+             folder / "other.db"});
     expectRefusal({"export", "--record", folder / "other.db", "-o", folder / "e.png", "--like", folder / "a.png"},
                   "is a picture of another body");
     expectRefusal({"export", "--record", threeSeconds(), "-o", folder / "e.nrrd", "--what", "ultrasound", "--at", "1s"},
