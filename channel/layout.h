@@ -160,13 +160,13 @@ struct State {
     std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
     // From the tip to where the needle's line touches it; infinite: not within lookAheadReach, nor within the throw [m].
     std::array<double, maxStructures> ahead{};
-    double aheadTissueDistance = 0;                // tip to the next tissue on that line; infinite: nowhere near [m]
-    double aheadSpeed = 0;                         // of the tip along it [m/s]
-    std::uint32_t aheadTissue = 0;                 // row of the tissue table
-    std::uint16_t rested = 0;                      // on the skin so far, and not inside; 65535 stands for more [ms]
-    std::uint16_t reached = 0;                     // 1: the tip has been in the target
-    double coreTarget = 0;                         // fraction of target tissue in the last core
-    double coreLength = 0;                         // length in the target of the last core [m]
+    double aheadTissueDistance = 0;  // tip to the next tissue on that line; infinite: nowhere near [m]
+    double aheadSpeed = 0;           // of the tip along it [m/s]
+    std::uint32_t aheadTissue = 0;   // row of the tissue table
+    std::uint16_t rested = 0;        // on the skin so far, and not inside; 65535 stands for more [ms]
+    std::uint16_t reached = 0;       // 1: the tip has been in the target
+    double coreTarget = 0;           // fraction of target tissue in the last core
+    double coreLength = 0;           // length in the target of the last core [m]
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
     Standing standing = Standing::no;

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
