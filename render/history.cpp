@@ -9,15 +9,20 @@
 
 namespace palpate::render {
 
+namespace {
+
+constexpr double momentLength = 0.02;  // [s]
+
+}  // namespace
+
 void addTo(std::deque<History::Moment>& moments, const channel::State& state)
 {
-    constexpr double length = 0.02;  // [s]
     History::Moment moment{
         state.time, glm::length(vec(state.basic)), glm::length(vec(state.additional)), glm::length(vec(state.total)), {}};
     for (std::size_t s = 0; s < moment.distance.size(); ++s)
         moment.distance[s] = static_cast<float>(state.distance[s]);
     const double begun = moments.empty() ? moment.time + 1 : moments.back().time;
-    if (moment.time < begun || moment.time - begun >= length) {
+    if (moment.time < begun || moment.time - begun >= momentLength) {
         moments.push_back(moment);
         return;
     }
@@ -34,7 +39,8 @@ void History::add(const channel::State& state)
     if (any_ && state.tick == last_.tick)
         return;
     if (any_ && state.time < last_.time) {
-        while (!moments.empty() && moments.back().time > state.time)
+        // Also the one that may hold something later.
+        while (!moments.empty() && moments.back().time + momentLength > state.time)
             moments.pop_back();
         while (!events.empty() && events.back().time > state.time)
             events.pop_back();

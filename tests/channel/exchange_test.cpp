@@ -174,9 +174,10 @@ TEST(Exchange, SeveralReadersNeverSeeATornCopy)
         reader.join();
     stop = true;
     writer.join();
+    constexpr std::uint64_t least = 200;  // that three readers get in the minute on a busy machine
     for (const Seen& mine : seen) {
-        EXPECT_GE(mine.states, enough);
-        EXPECT_GE(mine.displaced, enough);
+        EXPECT_GE(mine.states, least);
+        EXPECT_GE(mine.displaced, least);
         EXPECT_EQ(mine.torn, 0U);
         EXPECT_EQ(mine.backwards, 0U);
     }
