@@ -309,7 +309,7 @@ TEST_F(Viewer, EndsCleanlyWhenInterrupted)
 // How many pixels of a screen have a colour: Xvfb keeps its frame buffer in a file (X11/XWDFile.h, big endian, BGRX).
 int countOnScreen(const fs::path& file, const Pixel& colour)
 {
-    const std::string bytes = base::contentOf(file).value();
+    const std::string bytes = base::contentOf(file).value_or("");
     const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
     const auto word = [&](std::size_t n) {
         return static_cast<std::size_t>(byte(4 * n) << 24U | byte(4 * n + 1) << 16U | byte(4 * n + 2) << 8U |
