@@ -67,14 +67,14 @@ ReplayResult replay(const Record& record, const SessionModel& model)
 
 namespace {
 
-void addRow(volume::Fnv& hash, const volume::TissueRow& row)
+void addRow(base::Fnv& hash, const volume::TissueRow& row)
 {
     hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
                         row.cuttingForce, row.frictionPerMetre, row.stictionPerMetre, row.frictionDamping,
                         row.fixed ? 1.0 : 0.0, row.stiffening});
 }
 
-void addVoxels(volume::Fnv& hash, const volume::Tissue& tissue)
+void addVoxels(base::Fnv& hash, const volume::Tissue& tissue)
 {
     hash.add(tissue.affine());
     for (const auto& s : tissue.structures()) {
@@ -86,7 +86,7 @@ void addVoxels(volume::Fnv& hash, const volume::Tissue& tissue)
 
 std::string modelHash(const SessionModel& model)
 {
-    volume::Fnv hash;
+    base::Fnv hash;
     for (const auto& row : model.tissue->table().rows) {
         addRow(hash, row);
         if (model.scene.model.relaxation) {
@@ -110,7 +110,7 @@ std::string modelHash(const SessionModel& model)
 
 std::string bodyHash(const SessionModel& model)
 {
-    volume::Fnv hash;
+    base::Fnv hash;
     for (const auto& row : model.tissue->table().rows) {
         addRow(hash, row);
     }

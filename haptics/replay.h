@@ -1,9 +1,9 @@
 #pragma once
 
+#include <base/fnv.h>
 #include <haptics/device.h>
 #include <haptics/recorder.h>
 #include <haptics/session_model.h>
-#include <volume/fnv.h>
 
 #include <cstdint>
 #include <optional>
@@ -19,7 +19,7 @@ public:
     std::uint64_t value() const noexcept { return hash_.value; }
 
 private:
-    volume::Fnv hash_;
+    base::Fnv hash_;
 };
 
 /// Plays the poses of a record to a live session, whose forces it does not feel.

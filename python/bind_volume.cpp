@@ -178,7 +178,7 @@ Labels labelArray(const py::array& given)
 
 Image imageArray(const py::array& given)
 {
-    const bool isNumbers = std::string_view("biufO").find(given.dtype().kind()) != std::string_view::npos;
+    const bool isNumbers = holdsNumbers(given);
     auto values = isNumbers ? Image::ensure(given) : Image();
     if (!isNumbers || !values) {
         PyErr_Clear();

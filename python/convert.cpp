@@ -25,11 +25,16 @@ void refuseMasked(const py::handle& given, const std::string& name)
     refuseIf(masked, name, ": is a masked array: give a plain one, such as its filled()");
 }
 
+bool holdsNumbers(const py::array& array)
+{
+    return std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
+}
+
 Doubles doublesOf(const py::handle& given, const char* name, const char* wanted)
 {
     refuseMasked(given, name);
     const auto array = py::array::ensure(given);
-    const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
+    const bool isNumbers = array && holdsNumbers(array);
     auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
     if (isNumbers && !numbers && array.dtype().kind() != 'O') {
         throw std::bad_alloc();  // nothing else can go wrong with numbers

@@ -33,6 +33,9 @@ py::array_t<double> vectorOf(Vec3 v);
 
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
+/// Whether an array is of numbers or of objects that may be numbers, and not of words or complex numbers.
+bool holdsNumbers(const py::array& array);
+
 /// Numbers as Python's caller gave them, none of which are words or masked. Throws ValueError("NAME: WANTED").
 Doubles doublesOf(const py::handle& given, const char* name, const char* wanted);
 /// Throws ValueError if it is an array with a mask: what that hides would be taken for numbers.

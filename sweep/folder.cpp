@@ -1,11 +1,11 @@
 #include <sweep/folder.h>
 
 #include <base/error.h>
+#include <base/fnv.h>
 #include <base/inputs.h>
 #include <base/outputs.h>
 #include <base/process.h>
 #include <datasets/scene_text.h>
-#include <volume/fnv.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -42,7 +42,7 @@ std::string textOf(const fs::path& file)
 
 std::string hashOf(const std::string& bytes)
 {
-    volume::Fnv hash;
+    base::Fnv hash;
     hash.addAll(std::span(bytes));
     return fmt::format("{} bytes, {:016x}", bytes.size(), hash.value);
 }
@@ -87,7 +87,7 @@ std::string lineOf(const json& entry)
 std::string checksumOf(json entry)
 {
     entry.erase("checksum");
-    volume::Fnv hash;
+    base::Fnv hash;
     const std::string text = lineOf(entry);
     hash.addAll(std::span(text));
     return fmt::format("{:016x}", hash.value);

@@ -1,45 +1,22 @@
 #include <ultrasound/scanner.h>
 
+#include <base/fnv.h>
 #include <base/processor_time.h>
 #include <channel/needle_shape.h>
 
 #include <algorithm>
-#include <cstddef>
-#include <cstring>
+#include <array>
+#include <cstdint>
 
 namespace palpate::ultrasound {
 
 namespace {
 
-// FNV-1a, eight bytes at once.
-class Hash {
-public:
-    template <typename T>
-    void add(std::span<const T> data) noexcept
-    {
-        const std::span<const std::byte> bytes = std::as_bytes(data);
-        for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-            std::uint64_t word = 0;
-            std::memcpy(&word, &bytes[at], std::min(sizeof word, bytes.size() - at));
-            value_ = (value_ ^ word) * 0x100000001b3;
-        }
-    }
-    template <typename T>
-    void add(const T& one) noexcept
-    {
-        add(std::span<const T>(&one, 1));
-    }
-    std::uint64_t value() const noexcept { return std::max<std::uint64_t>(value_, 1); }
-
-private:
-    std::uint64_t value_ = 0xcbf29ce484222325;
-};
-
 // Padding of structs would be of chance: numbers one by one.
 std::uint64_t hashOf(const channel::Scenery& scenery, std::span<const std::uint8_t> labels,
                      std::span<const std::uint8_t> fine)
 {
-    Hash hash;
+    base::Fnv hash;
     for (const channel::Grid* grid : {&scenery.labels, &scenery.fine}) {
         hash.add(grid->size);
         hash.add(grid->origin);
@@ -50,9 +27,9 @@ std::uint64_t hashOf(const channel::Scenery& scenery, std::span<const std::uint8
         hash.add(std::array{s.soundSpeed, s.density, s.attenuation, s.attenuationPower, s.echo, s.echoVariation});
         hash.add(s.pattern);
     }
-    hash.add(labels);
-    hash.add(fine);
-    return hash.value();
+    hash.addAll(labels);
+    hash.addAll(fine);
+    return std::max<std::uint64_t>(hash.value, 1);  // 0: not known
 }
 
 }  // namespace

@@ -1,12 +1,12 @@
 #include <studies/accuracy/reference_file.h>
 
 #include <base/error.h>
+#include <base/fnv.h>
 #include <base/folds.h>
 #include <base/inputs.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/vec_json.h>
-#include <volume/fnv.h>
 
 #include <fmt/format.h>
 #include <zlib.h>
@@ -213,19 +213,19 @@ std::pair<Reference, ReferenceInfo> parsed(const std::string& bytes)
 }
 
 // Lengths to the micrometre, directions to 1e-5: as well as another machine's rounding leaves them.
-void addLength(volume::Fnv& hash, double metres)
+void addLength(base::Fnv& hash, double metres)
 {
     hash.add(std::llround(1e6 * metres));
 }
 
-void addVector(volume::Fnv& hash, Vec3 v, double unit)
+void addVector(base::Fnv& hash, Vec3 v, double unit)
 {
     for (int c = 0; c < 3; ++c) {
         hash.add(std::llround(v[c] / unit));
     }
 }
 
-void addTissue(volume::Fnv& hash, const volume::Tissue& tissue, double poissonCap)
+void addTissue(base::Fnv& hash, const volume::Tissue& tissue, double poissonCap)
 {
     for (const volume::Structure& s : tissue.structures()) {
         const volume::TissueRow& row = tissue.table().rows[s.tissue];
@@ -282,7 +282,7 @@ std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& f
 std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
                          double poissonCap, bool withPress)
 {
-    volume::Fnv hash;
+    base::Fnv hash;
     hash.add(referenceVersion);
     hash.addText(law);
     addLength(hash, speed);

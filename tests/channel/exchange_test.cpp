@@ -117,11 +117,12 @@ struct Seen {
     std::uint64_t states = 0, displaced = 0, torn = 0, backwards = 0;
 };
 
-// Reads until both have been seen `enough` times, for a minute at most, and checks every copy against its closed form.
+// Reads until both have been seen `enough` times, and checks every copy against its closed form. Five minutes are for a
+// busy machine: with other work beside it took over one.
 Seen readMany(const std::string& session, std::uint64_t enough)
 {
     const auto subscriber = Subscriber::attach(session);
-    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(5);
     Seen seen;
     std::uint64_t last = 0;
     const auto displaced = std::make_unique<Displaced>();
@@ -174,10 +175,9 @@ TEST(Exchange, SeveralReadersNeverSeeATornCopy)
         reader.join();
     stop = true;
     writer.join();
-    constexpr std::uint64_t least = 200;  // that three readers get in the minute on a busy machine
     for (const Seen& mine : seen) {
-        EXPECT_GE(mine.states, least);
-        EXPECT_GE(mine.displaced, least);
+        EXPECT_GE(mine.states, enough);
+        EXPECT_GE(mine.displaced, enough);
         EXPECT_EQ(mine.torn, 0U);
         EXPECT_EQ(mine.backwards, 0U);
     }

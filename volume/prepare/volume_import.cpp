@@ -2,9 +2,9 @@
 
 #include <base/build.h>
 #include <base/error.h>
+#include <base/fnv.h>
 #include <base/quantities.h>
 #include <datasets/label_map.h>
-#include <volume/fnv.h>
 #include <volume/image_check.h>
 #include <volume/prepare/body.h>
 #include <volume/prepare/name_table.h>
@@ -112,7 +112,7 @@ std::vector<PreparationStep> addBody(const ImportRequest& o, volume::LabelImage&
 volume::Provenance provenanceOf(const ImportRequest& o, const volume::LabelImage& image,
                                 const std::vector<std::string>& notes, const std::vector<PreparationStep>& steps)
 {
-    volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
+    base::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
     hash.addAll(image.values);
     volume::Provenance provenance = {{"source", o.input.filename().string()},
                                      {"label hash", fmt::format("{:016x}", hash.value)},

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace palpate::volume {
+namespace palpate::base {
 
 /// 64-bit FNV-1a over plain data, byte by byte: tells contents apart, protects against nobody.
 /// Source: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm", IETF draft.
@@ -41,4 +41,4 @@ struct Fnv {
     }
 };
 
-}  // namespace palpate::volume
+}  // namespace palpate::base
