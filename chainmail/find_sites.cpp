@@ -17,6 +17,9 @@ namespace {
 constexpr double coarse = 0.11;          // area of a surface point that is quartered, in that of a cell's face,
 constexpr double close = 0.3;            // and how far from the tool it may be [cells]
 constexpr double lengthRounding = 1e-6;  // of a rod, in cells
+constexpr double otherTissue = 1.25;     // times as stiff as the softest along a ring of a rod
+constexpr double endless = 1.0;          // length of a rod [m]
+constexpr double shortestRing = 0.13;    // that is halved, in the finest cells
 constexpr double compressible = 4.2;     // how fast compliance that cells lack grows as nu falls
 
 double touchedAtFirst(double radius) noexcept
@@ -106,28 +109,54 @@ private:
     // with the axis.
     void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
     {
-        const auto mu = static_cast<double>(muAt(body_.levels.front(), tie.rest));
         locate(body_, windows_, tie.rest, site);
-        if (mu <= 0.0 || site.level >= windows_.size()) {
+        if (!hasTissue(tie.rest) || site.level >= windows_.size()) {
             return;
         }
         // Next to a window's border cells give way as little as those of the next coarser window, which hold it.
         const std::size_t level = std::min<std::size_t>(site.level + (atBorder(site) ? 1U : 0U), windows_.size() - 1);
         const double spacing = body_.levels[level].nodes.spacing;
         const double rings = std::max(1.0, std::ceil(tie.piece.length / spacing - lengthRounding));
-        const RodRing ring = ringOf({tie.piece.radius, tie.piece.length / rings, tie.piece.rod}, mu, spacing);
+        const double length = tie.piece.length / rings;
+        for (double r = 0.0; r < rings; ++r) {
+            const Vec3 middle = tie.rest + ((r + 0.5) * length - 0.5 * tie.piece.length) * tie.restAxis;
+            addRing(tie, site, {middle, length, spacing}, index);
+        }
+    }
+
+    struct RingPlace {
+        Vec3 middle;
+        double length, spacing;  // spacing: of the cells that hold it [m]
+    };
+
+    // A ring holds as firmly as its tissue; one that begins in another tissue than it ends in is halved. Bone does not move
+    // with the rest of the rod, so the rod's length does not count there.
+    void addRing(const Tie& tie, ContactSite& site, const RingPlace& at, std::size_t index) noexcept
+    {
+        const auto tissueOf = [&](Vec3 place) { return hasTissue(place) ? place : tie.rest; };
+        const auto mu = [&](double half) {
+            const Vec3 place = tissueOf(at.middle + 0.5 * half * at.length * tie.restAxis);
+            return static_cast<double>(muAt(body_.levels.front(), place));
+        };
+        const auto [least, most] = std::minmax({mu(-1.0), mu(0.0), mu(1.0)});
+        if (most > otherTissue * least && at.length > shortestRing * body_.levels.front().nodes.spacing) {
+            const Vec3 quarter = 0.25 * at.length * tie.restAxis;
+            addRing(tie, site, {at.middle - quarter, 0.5 * at.length, at.spacing}, index);
+            addRing(tie, site, {at.middle + quarter, 0.5 * at.length, at.spacing}, index);
+            return;
+        }
+        const Vec3 onAxis = tissueOf(at.middle);
+        const double rod = isHeld(onAxis) ? endless : tie.piece.rod;
+        const RodRing ring = ringOf({tie.piece.radius, at.length, rod}, mu(0.0), at.spacing);
         site.stiffness = ring.along / ring.points;
         site.across = ring.across / ring.points;
         const Vec3 one = acrossOf(tie.restAxis), other = glm::cross(tie.restAxis, one);
-        for (double r = 0.0; r < rings; ++r) {
-            const Vec3 middle = tie.rest + tie.piece.length * ((r + 0.5) / rings - 0.5) * tie.restAxis;
-            for (double i = 0.0; i < ring.points; ++i) {
-                // Pieces are turned against each other: where cells are long, there are several rings in each.
-                const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
-                site.rest = middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
-                site.anchor = hasTissue(site.rest) ? site.rest : tie.rest;
-                add(site);
-            }
+        for (double i = 0.0; i < ring.points; ++i) {
+            // Pieces are turned against each other: where cells are long, there are several rings in each.
+            const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
+            site.rest = at.middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
+            site.anchor = hasTissue(site.rest) ? site.rest : onAxis;
+            add(site);
         }
     }
 
@@ -212,6 +241,12 @@ private:
             site.area = 0.25F * whole.area;
             addIfNear(shape, site);
         }
+    }
+
+    bool isHeld(Vec3 at) const noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        return body_.held[grid.offset(grid.cellAt(at))] > 0.5F;
     }
 
     bool hasTissue(Vec3 at) const noexcept { return muAt(body_.levels.front(), at) > 0.0F; }

@@ -126,6 +126,49 @@ TEST(Rod, IsHeldAsStifflyByCoarseCells)
     }
 }
 
+// Springs once took the tissue of a piece's middle for all of the piece: a rod of 5 mm whose last 2 mm lie in bone was
+// 8000 times looser than one of 2 mm.
+TEST(Rod, HoldsInEachTissueAsFirmlyAsThatSays)
+{
+    const double h = 2e-3;
+    const auto layered = [h](double stiff, bool fixed) {
+        tests::ElasticBlock block = tests::heldBlock({24, 24, 24}, h, rodTissue, 0.45);
+        block.material = [=](Index3 c) {
+            return tests::tissue(c.y < 14 ? rodTissue : stiff, 0.45, fixed ? c.y >= 14 : c.y == 23);
+        };
+        return tests::bodyOf(block);
+    };
+    const auto rodTo = [](double tip, double length) {
+        return Rod{{24e-3, tip - 0.5 * length, 25e-3}, {0, 1, 0}, 1.05e-3, length};
+    };
+    const auto found = [](const ElasticBody& body, const Rod& rod, Vec3 way, int pieces) {
+        const auto ties = piecesOf(rod, 1e-4 * way, pieces);
+        Elastic elastic(body, {.window = 63}, tests::focusAt(rod.middle));
+        tests::settle(elastic, {{}, ties, tests::focusAt(rod.middle)}, 1e-4);
+        Vec3 sum(0.0);
+        for (std::size_t i = 0; i < ties.size(); ++i) {
+            sum += elastic.tieForce(i);
+        }
+        return -glm::dot(sum, way);
+    };
+    const double boundary = 28e-3;
+    const ElasticBody onBone = layered(1e9, true), onTumour = layered(10.0 * rodTissue, false);
+    for (const Vec3 way : {Vec3(1, 0, 0), Vec3(0, 1, 0)}) {
+        const double inBone = found(onBone, rodTo(boundary + 2e-3, 2e-3), way, 1);
+        for (const double length : {3e-3, 4e-3, 5e-3, 6.5e-3, 9e-3, 13e-3, 23e-3}) {
+            const double all = found(onBone, rodTo(boundary + 2e-3, length), way, static_cast<int>(piecesOfRod(length)));
+            EXPECT_GT(all, 0.9 * inBone) << length << ", along " << way.y;
+            EXPECT_LT(all, 1.1 * inBone) << length << ", along " << way.y;
+        }
+        // However it is divided into pieces.
+        const Rod through = rodTo(boundary + 5e-3, 13e-3);
+        const double once = found(onTumour, through, way, 1);
+        for (const int pieces : {2, 3, 4, 6}) {
+            EXPECT_NEAR(found(onTumour, through, way, pieces) / once, 1.0, 0.03) << pieces << ", along " << way.y;
+        }
+    }
+}
+
 // What a ring lacks are logarithms and what the ends do: of two thin rods of one length the compliances differ by
 // ln(a2 / a1) / (2 pi mu l), a long one's ring is short of its own by as much as its radius says.
 TEST(Rod, SpringsAreWhatTheRingLacks)
