@@ -140,6 +140,7 @@ json pressFigures(const PressArguments& o, const Run& run)
              {"tick_us", {{"p50", 1e6 * s.times.p50}, {"p99", 1e6 * s.times.p99}, {"max", 1e6 * s.times.max}}},
              {"peak_force_n", s.peakForce},
              {"held_from_s", s.heldFrom ? json(*s.heldFrom) : json()},
+             {"passed_from_s", s.passedFrom ? json(*s.passedFrom) : json()},
              {"samples", base::mapped<json>(run.samples, sampleFigures)},
              {"displacement", json::array()}};
     for (std::size_t i = 0; i < run.points.size(); ++i) {
@@ -192,6 +193,11 @@ void printPress(const PressArguments& o, const Run& run)
         fmt::print(
             "from {:.3f} s on the tool is deeper than the model bears, and held back: column behind_mm says by how much\n",
             *s.heldFrom);
+    }
+    if (s.passedFrom) {
+        fmt::print(
+            "from {:.3f} s on the tool lies wholly beyond the body as it is at rest: forces there are extrapolated\n",
+            *s.passedFrom);
     }
     if (s.notConverged > 0) {
         fmt::print("{} of {} samples are not solved to convergence: column residual says which\n", s.notConverged,

@@ -129,25 +129,27 @@ private:
         double length, spacing;  // spacing: of the cells that hold it [m]
     };
 
-    // A ring holds as firmly as its tissue; one that begins in another tissue than it ends in is halved. Bone does not move
-    // with the rest of the rod, so the rod's length does not count there.
+    // A ring holds as firmly as its tissue; one that begins in another tissue than it ends in is halved. Bone does not
+    // move with the rest of the rod, so neither the rod's length nor the window counts there.
     void addRing(const Tie& tie, ContactSite& site, const RingPlace& at, std::size_t index) noexcept
     {
+        const double finest = body_.levels.front().nodes.spacing;
         const auto tissueOf = [&](Vec3 place) { return hasTissue(place) ? place : tie.rest; };
         const auto mu = [&](double half) {
             const Vec3 place = tissueOf(at.middle + 0.5 * half * at.length * tie.restAxis);
             return static_cast<double>(muAt(body_.levels.front(), place));
         };
         const auto [least, most] = std::minmax({mu(-1.0), mu(0.0), mu(1.0)});
-        if (most > otherTissue * least && at.length > shortestRing * body_.levels.front().nodes.spacing) {
+        if (most > otherTissue * least && at.length > shortestRing * finest) {
             const Vec3 quarter = 0.25 * at.length * tie.restAxis;
             addRing(tie, site, {at.middle - quarter, 0.5 * at.length, at.spacing}, index);
             addRing(tie, site, {at.middle + quarter, 0.5 * at.length, at.spacing}, index);
             return;
         }
         const Vec3 onAxis = tissueOf(at.middle);
-        const double rod = isHeld(onAxis) ? endless : tie.piece.rod;
-        const RodRing ring = ringOf({tie.piece.radius, at.length, rod}, mu(0.0), at.spacing);
+        const bool inBone = isHeld(onAxis);
+        const RodRing ring = inBone ? ringOf({tie.piece.radius, at.length, endless}, mu(0.0), finest)
+                                    : ringOf({tie.piece.radius, at.length, tie.piece.rod}, mu(0.0), at.spacing);
         site.stiffness = ring.along / ring.points;
         site.across = ring.across / ring.points;
         const Vec3 one = acrossOf(tie.restAxis), other = glm::cross(tie.restAxis, one);
@@ -156,7 +158,7 @@ private:
             const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
             site.rest = at.middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
             site.anchor = hasTissue(site.rest) ? site.rest : onAxis;
-            add(site);
+            add(site, isHeld(site.anchor));
         }
     }
 
@@ -279,10 +281,16 @@ private:
         return true;
     }
 
-    void add(ContactSite& site) noexcept
+    // What is held moves with no node: the cells of wider windows may hold soft tissue beside it.
+    void add(ContactSite& site, bool held = false) noexcept
     {
-        if (count_ < out_.size() && meetsTissue(site)) {
-            out_[count_++] = site;
+        if (count_ == out_.size() || !meetsTissue(site)) {
+            return;
+        }
+        ContactSite& added = out_[count_++] = site;
+        if (held) {
+            added.fraction.fill(0.0F);
+            added.u = Vec3(0.0);
         }
     }
 

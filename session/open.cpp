@@ -203,8 +203,8 @@ std::string widerCells(const haptics::SessionModel& model)
     const double wanted = isElastic ? asked.elastic.spacing : asked.spacing, has = model.lattice.grid.spacing;
     return has <= (1.0 + rounding) * wanted ? ""
                                             : fmt::format(
-                                                  "the body has cells of {:.2g} mm: of the {:g} mm that [{}] spacing_mm "
-                                                  "asks for it would be over 4 million",
+                                                  "the body has cells of {:.4g} mm: with the {:g} mm of [{}] spacing_mm it "
+                                                  "would have over 4 million",
                                                   1e3 * has, 1e3 * wanted, isElastic ? "model.elastic" : "model");
 }
 

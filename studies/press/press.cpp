@@ -109,6 +109,11 @@ void PoseLoad::moveProxy(const ToolPose& pose) noexcept
     last_ = pose.position;
 }
 
+bool PoseLoad::isBeyond(const ToolPose& pose) const noexcept
+{
+    return proxy_ && haptics::deepestPlace(model_.surface, proxyTool(pose), pose.position).distance > tool_.radius;
+}
+
 // Around the point of the surface under a place of the tool's axis.
 chainmail::Focus PoseLoad::focusUnder(Vec3 deepest) const noexcept
 {
@@ -252,6 +257,9 @@ private:
     {
         if (s.behind > 0.0 && given && !summary_.heldFrom) {
             summary_.heldFrom = s.pose.seconds;
+        }
+        if (!summary_.passedFrom && load_.isBeyond(s.pose)) {
+            summary_.passedFrom = s.pose.seconds;
         }
         if (elastic_.atRest()) {
             return;

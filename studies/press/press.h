@@ -39,6 +39,8 @@ public:
     Vec3 force(const chainmail::Elastic& elastic) const noexcept;
     /// The tool presses on the surface.
     bool inContact() const noexcept { return proxy_.has_value(); }
+    /// It does so from the far side: all of the tool lies beyond the body as that is at rest.
+    bool isBeyond(const ToolPose& pose) const noexcept;
     /// Where windows shall be while the tool is there: at the surface under its proxy, or under itself where it has none;
     /// for a needle, around the middle of what it holds.
     chainmail::Focus focusAt(const ToolPose& pose) const noexcept;
@@ -95,7 +97,8 @@ struct PressSummary {
     TickTimes times;               // of ticks in contact
     double peakForce = 0;          // magnitude [N]
     ToolPose peakAt;
-    std::optional<double> heldFrom;  // when the tool is first held back [s]
+    std::optional<double> heldFrom;    // when the tool is first held back [s]
+    std::optional<double> passedFrom;  // when it first touches tissue from beyond the body as that is at rest [s]
 };
 
 /// Residual to which PressOptions::converge solves, fraction of the contacts' forces.

@@ -32,6 +32,7 @@ TEST_F(PressCommand, FiguresHaveTheTissuesForceAndTheWayOfThePoints)
     EXPECT_EQ(j.at("tool").at("kind"), "sphere");
     EXPECT_EQ(j.at("ticks"), 201);
     EXPECT_TRUE(j.at("held_from_s").is_null());
+    EXPECT_TRUE(j.at("passed_from_s").is_null());
     EXPECT_GT(j.at("tick_us").at("p99").get<double>(), 0.0);
     ASSERT_EQ(j.at("samples").size(), 201U);
     double peak = 0.0;

@@ -202,6 +202,20 @@ TEST(PressDeep, AToolPressedThroughAThinPartKeepsItsSide)
     }
 }
 
+TEST(PressDeep, AToolThatIsThroughAsAWholeIsReported)
+{
+    const auto model = bodyOf(shelf);
+    const auto passedFrom = [&](double depth) {
+        return pressed(model, inAndOut(Vec3(0.0), Vec3(0, 1, 0), 10e-3, depth), tenBall).summary.passedFrom;
+    };
+    EXPECT_FALSE(passedFrom(26e-3));
+    const auto from = passedFrom(30e-3);
+    ASSERT_TRUE(from);
+    const PosePath path = inAndOut(Vec3(0.0), Vec3(0, 1, 0), 10e-3, 30e-3);
+    const double back = path.at(static_cast<std::size_t>(std::lround(*from * 1e3))).position.y - 10e-3;
+    EXPECT_NEAR(back, 8e-3, 0.5e-3);
+}
+
 // Round the shelf's edge its way is from the side that it slid to, and it never jumps.
 TEST(PressDeep, AToolThatSlidesOverAnEdgeIsPushedFromItsNewSide)
 {
