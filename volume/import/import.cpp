@@ -140,7 +140,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
     checkFile(path);
     if (isVdb(path)) {
         refuseVolume(path, options);
-        refuseThreshold(path, options);
+        refuseSegmentationOptions(path, options);
         return labelsApart(path, "OpenVDB", options, [&](const ImportOptions& o) { return vdbLabels(path, o); });
     }
     if (isDicom(path)) {
@@ -149,7 +149,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
-    refuseThreshold(path, options);
+    refuseSegmentationOptions(path, options);
     ImportedLabels labels = labelsOf(checkedSource(path, options, options.sheared), options);
     if (options.dicomLabels) {
         labels.warnings.emplace_back("--dicom-labels decides nothing: it is no DICOM");
@@ -212,6 +212,13 @@ void refuseThreshold(const std::filesystem::path& file, const ImportOptions& opt
     refuseIf(options.fractionalThreshold.has_value(), file,
              "--threshold {:g}: it is no fractional DICOM SEG, and holds no probabilities: leave --threshold out",
              options.fractionalThreshold.value_or(0.0F));
+}
+
+void refuseSegmentationOptions(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseThreshold(file, options);
+    refuseIf(options.sliceSpacing > 0, file, "--slice-spacing {:g}: it is no DICOM SEG: leave --slice-spacing out",
+             1e3 * options.sliceSpacing);
 }
 
 void placeAxes(Source& source, const ImportOptions& options)

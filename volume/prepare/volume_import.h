@@ -20,6 +20,8 @@ struct ImportRequest {
     std::string stiffness;          // stiffness map, see datasets::stiffnessMap(); empty: the image changes nothing
     std::string imageUnit;          // "HU", where the image's file does not say so
     int imageVolume = 0;            // of an image with four dimensions, from 1
+    std::string imageSeries;        // of an image that is a folder; empty: reading.series where the labels are one file
+    bool ignoreFrame = false;       // labels and image of two DICOM frames of reference are in one all the same
     std::string imageAxes;          // where the image's axes go, if its file does not say it; empty: as reading.axes
     volume::ImportOptions reading;  // of the labels
     MappingOptions mapping;         // of labels to tissues
@@ -33,7 +35,8 @@ struct LengthBounds {
     const char* option;
     double least, most;
 };
-inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, skinBounds{"--add-skin", 0.05e-3, 50e-3},
+inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, sliceBounds{"--slice-spacing", 0.05e-3, 50e-3},
+    skinBounds{"--add-skin", 0.05e-3, 50e-3},
     hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5}, cropBounds{"--crop-margin", 0, 1},
     holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
 
