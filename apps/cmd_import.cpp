@@ -66,6 +66,11 @@ void checkOptions(const ImportArguments& o)
     prepare::checkRequest(o);
     base::checkOutputs({o.output, o.mapping.writeMap, o.json},
                        {o.input, o.image, o.stiffness, o.tissues, o.mapping.map, o.mapping.names});
+    prepare::checkReplaced(o, {o.output, o.mapping.writeMap, o.json});
+    std::error_code none;
+    base::failIf(fs::is_regular_file(o.mapping.writeMap, none),
+                 "{}: is there already, perhaps with what you filled in: give --write-map another name, or remove it",
+                 o.mapping.writeMap.native());
 }
 
 void runImport(ImportArguments o)

@@ -84,6 +84,10 @@ ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptio
 /// Reads an intensity image from the same formats, slope and intercept applied. Throws like importLabels().
 ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options = {});
 
+/// The files that importLabels() or importImage() would read: those of a folder that are of its kinds, a header and its
+/// data. Throws like these.
+std::vector<std::filesystem::path> filesOf(const std::filesystem::path& path);
+
 /// Largest deviation of the angles between voxel axes from a right angle [rad].
 double shearOf(const Affine& affine) noexcept;
 

@@ -143,6 +143,23 @@ bool isDicom(const std::filesystem::path& file)
     return in.gcount() >= 16 && group;
 }
 
+Files filesOfFolder(const std::filesystem::path& folder)
+{
+    Files files;
+    for (const std::filesystem::path& file : filesIn(folder)) {
+        if (hasSourceName(file) || isDicom(file)) {
+            files.push_back(file);
+        }
+        try {
+            const Source source = hasSourceName(file) ? readSource(file) : Source();
+            files.insert(files.end(), {source.header, source.data});
+        } catch (const std::runtime_error&) {
+            continue;  // the import says so, where it reads it at all
+        }
+    }
+    return files;
+}
+
 Files dicomFilesIn(const std::filesystem::path& folder)
 {
     const Files files = dicomAmong(filesIn(folder));

@@ -260,6 +260,19 @@ Source readSource(const std::filesystem::path& file)
     return reader(file);
 }
 
+std::vector<std::filesystem::path> filesOf(const std::filesystem::path& path)
+{
+    std::error_code error;
+    if (std::filesystem::is_directory(path, error)) {
+        return filesOfFolder(path);
+    }
+    if (readerFor(path) == nullptr) {
+        return {path};
+    }
+    const Source source = readSource(path);
+    return {path, source.header, source.data};
+}
+
 std::int64_t ImportedLabels::originalOf(std::uint16_t value) const noexcept
 {
     const auto found = std::ranges::find(renumbered, value, &Renumbered::value);

@@ -3,6 +3,7 @@
 #include <base/build.h>
 #include <base/error.h>
 #include <base/fnv.h>
+#include <base/outputs.h>
 #include <base/quantities.h>
 #include <datasets/label_map.h>
 #include <volume/image_check.h>
@@ -240,6 +241,24 @@ void checkRequest(const ImportRequest& o)
                  "--series: neither the labels nor the image are a folder of DICOM: leave --series out");
     base::failIf(!o.reading.series.empty() && !o.imageSeries.empty() && !isFolder(o.input),
                  "--series: the labels are one file: leave --series out");
+}
+
+void checkReplaced(const ImportRequest& o, const std::vector<fs::path>& outputs)
+{
+    std::error_code none;
+    if (std::ranges::none_of(outputs, [&](const fs::path& file) { return fs::is_regular_file(file, none); })) {
+        return;
+    }
+    std::vector<fs::path> files = volume::filesOf(o.input);
+    if (!o.image.empty()) {
+        const std::vector<fs::path> more = volume::filesOf(o.image);
+        files.insert(files.end(), more.begin(), more.end());
+    }
+    std::vector<std::string> notes;
+    if (const auto found = o.mapping.names.empty() ? datasetOf(o.input, notes) : std::nullopt) {
+        files.push_back(*found);
+    }
+    base::checkOutputs(outputs, files);
 }
 
 NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)

@@ -36,13 +36,16 @@ struct LengthBounds {
     double least, most;
 };
 inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, sliceBounds{"--slice-spacing", 0.05e-3, 50e-3},
-    skinBounds{"--add-skin", 0.05e-3, 50e-3},
-    hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5}, cropBounds{"--crop-margin", 0, 1},
-    holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
+    skinBounds{"--add-skin", 0.05e-3, 50e-3}, hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5},
+    cropBounds{"--crop-margin", 0, 1}, holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
 
 /// Throws std::runtime_error for a request that contradicts itself, or has a length out of its bounds, by the options of
 /// `palpate import`.
 void checkRequest(const ImportRequest& request);
+
+/// Refuses an output that is there and is one of the files that the import reads: those that the request names, their data
+/// beside a header, what a folder of it holds, and the dataset.json that is found. Throws std::runtime_error.
+void checkReplaced(const ImportRequest& request, const std::vector<std::filesystem::path>& outputs);
 
 /// Told what is going on, and the fraction of it that is done where that is known.
 using ImportProgress = std::function<void(const std::string& what, std::optional<double> fraction)>;
