@@ -23,8 +23,9 @@ Fields readFields(const std::filesystem::path& file, std::uint64_t& end)
             break;
         }
         const std::string key = trimmed(line.substr(0, equals));
-        refuseIf(!fields.emplace(key, trimmed(line.substr(equals + 1))).second, file,
-                 "its header gives '{}' twice: save it again", key.substr(0, 60));
+        const std::string value = trimmed(line.substr(equals + 1));
+        refuseIf(fields.emplace(key, value).first->second != value, file,
+                 "its header gives '{}' twice, and says something else each time: save it again", key.substr(0, 60));
     }
     refuseIf(fields.count("ElementDataFile") == 0 || fields.count("DimSize") == 0 || fields.count("ElementType") == 0, file,
              "is not a MetaImage, DimSize, ElementType or ElementDataFile is missing from its header: save it again");
