@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 struct ImportArguments : prepare::ImportRequest {
     fs::path output, tissues, json;
-    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;  // as they were typed
+    std::string voxel, sliceSpacing, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;  // as they were typed
 };
 
 void readLengths(ImportArguments& o)
@@ -37,6 +37,7 @@ void readLengths(ImportArguments& o)
         target = text.empty() ? target : base::lengthFrom(bounds.option, text, bounds.least, bounds.most);
     };
     set(o.steps.voxel, o.voxel, prepare::voxelBounds);
+    set(o.reading.sliceSpacing, o.sliceSpacing, prepare::sliceBounds);
     set(o.steps.addSkin, o.addSkin, prepare::skinBounds);
     set(o.hull, o.bodyFromHull, prepare::hullBounds);
     set(o.steps.pad, o.pad, prepare::padBounds);
@@ -65,6 +66,11 @@ void checkOptions(const ImportArguments& o)
     prepare::checkRequest(o);
     base::checkOutputs({o.output, o.mapping.writeMap, o.json},
                        {o.input, o.image, o.stiffness, o.tissues, o.mapping.map, o.mapping.names});
+    prepare::checkReplaced(o, {o.output, o.mapping.writeMap, o.json});
+    std::error_code none;
+    base::failIf(fs::is_regular_file(o.mapping.writeMap, none),
+                 "{}: is there already, perhaps with what you filled in: give --write-map another name, or remove it",
+                 o.mapping.writeMap.native());
 }
 
 void runImport(ImportArguments o)
@@ -106,6 +112,10 @@ void addReading(CLI::App& command, ImportArguments& o)
     command.add_option("--series", o.reading.series, "SeriesInstanceUID to read from a folder with several series")
         ->type_name("UID");
     command
+        .add_option("--slice-spacing", o.sliceSpacing,
+                    "Distance between the slices of a DICOM SEG that omits slices and does not define it")
+        ->type_name("MM");
+    command
         .add_option("--threshold", o.reading.fractionalThreshold,
                     "Lowest probability of tissue in a fractional DICOM SEG (default: 0.5)")
         ->check(CLI::Range(0.0, 1.0));
@@ -126,6 +136,12 @@ void addReading(CLI::App& command, ImportArguments& o)
         .add_option("--image-axes", o.imageAxes,
                     "Directions of the image's voxel axes, if its file does not define them (default: as --axes)")
         ->type_name("XYZ");
+    command
+        .add_option("--image-series", o.imageSeries,
+                    "SeriesInstanceUID of the image in a folder with several series (default: that of the DICOM SEG)")
+        ->type_name("UID");
+    command.add_flag("--ignore-frame-of-reference", o.ignoreFrame,
+                     "Accept an image whose DICOM frame of reference is not that of the labels");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
         ->type_name("FILE");
     command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; not needed for DICOM")

@@ -267,8 +267,8 @@ py::list tissuesOf(const VolumeBox& box)
 
 std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const std::string& map,
                                   const std::string& defaultTissue, const Path& image, const std::string& imageUnit,
-                                  const std::string& stiffnessFrom, double voxel, bool bodyFromImage, double bodyFromHull,
-                                  const Path& tissues)
+                                  const std::string& imageSeries, bool ignoreFrame, const std::string& stiffnessFrom,
+                                  double voxel, bool bodyFromImage, double bodyFromHull, const Path& tissues)
 {
     checkUnit(imageUnit);
     prepare::ImportRequest request;
@@ -281,6 +281,8 @@ std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const
     }
     request.image = image;
     request.imageUnit = imageUnit;
+    request.imageSeries = imageSeries;
+    request.ignoreFrame = ignoreFrame;
     request.stiffness = stiffnessFrom;
     request.steps.voxel = voxel;
     request.reading.sheared = voxel > 0;
@@ -337,6 +339,7 @@ void bindVolume(py::module_& module)
         .def_static("open", &open, py::arg("file"))
         .def_static("import_", &import, py::arg("path"), py::kw_only(), py::arg("set") = py::dict(), py::arg("map") = "",
                     py::arg("default_tissue") = "", py::arg("image") = none, py::arg("image_unit") = "",
+                    py::arg("image_series") = "", py::arg("ignore_frame_of_reference") = false,
                     py::arg("stiffness_from") = "", py::arg("voxel") = 0.0, py::arg("body_from_image") = false,
                     py::arg("body_from_hull") = 0.0, py::arg("tissues") = none)
         .def_static("phantom", &phantom, py::arg("name") = "breast", py::arg("seed") = 1, py::arg("voxel") = 1e-3,

@@ -22,6 +22,7 @@ constexpr double firstStep = 0.25;  // of the mean edge at a point,
 constexpr double lastStep = 0.01;   // and where the search ends
 constexpr double smooth = 0.9;      // cosine between a facet's normal and the mean, from which on a surface is smooth
 constexpr double gain = 1e-3;       // least that a move has to bring [degrees]
+constexpr int mostSteps = 1000;     // of one point at a time
 
 // 6 along the axes, 8 along the diagonals.
 std::vector<Vec3> directions()
@@ -63,7 +64,8 @@ public:
         static const std::vector<Vec3> to = directions();
         double best = worstAround(p);
         const double edge = meanEdge(p);
-        for (double step = firstStep; step > lastStep;) {
+        double step = firstStep;
+        for (int i = 0; i < mostSteps && step > lastStep; ++i) {
             const Vec3 from = mesh_.points[p];
             Vec3 found = from;
             for (const Vec3 d : to) {
@@ -82,13 +84,16 @@ public:
     }
 
 private:
-    // A point is free on a surface whose facets there all look nearly the same way, but for front and back.
+    // A point is free on a surface whose facets there all look nearly the same way, but for front and back. A facet without
+    // area looks nowhere: its points stay.
     void readSurfaces(Moving moving)
     {
         const Surfaces surfaces = surfacesOf(mesh_, AllPoints::yes);
         const auto normalOf = [&](const Surfaces::Facet& f) {
             const Vec3 a = mesh_.points[f.points[0]];
-            return glm::normalize(glm::cross(mesh_.points[f.points[1]] - a, mesh_.points[f.points[2]] - a));
+            const Vec3 n = glm::cross(mesh_.points[f.points[1]] - a, mesh_.points[f.points[2]] - a);
+            const double length = glm::length(n);
+            return length > 0.0 ? n / length : Vec3(0.0);
         };
         for (const auto& f : surfaces.facets) {
             const Vec3 n = normalOf(f);
@@ -100,8 +105,8 @@ private:
             const Vec3 n = normalOf(f);
             for (const std::uint32_t p : f.points) {
                 const double length = glm::length(normal_[p]);
-                const bool bends = length == 0.0 || std::abs(glm::dot(normal_[p], n)) < smooth * length;
-                fixed_[p] = fixed_[p] != 0 || moving == Moving::inner || bends ? 1 : 0;
+                const bool flat = length > 0.0 && std::abs(glm::dot(normal_[p], n)) >= smooth * length;
+                fixed_[p] = fixed_[p] != 0 || moving == Moving::inner || !flat ? 1 : 0;
             }
         }
         for (Vec3& n : normal_) {

@@ -101,7 +101,7 @@ double smallestDihedral(const TetMesh& mesh) noexcept
 
 double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept
 {
-    if (sixVolumes(mesh, tet) <= 0.0) {
+    if (!(sixVolumes(mesh, tet) > 0.0)) {
         return -1.0;
     }
     const auto [low, high] = dihedralsOf(mesh, tet);

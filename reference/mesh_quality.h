@@ -46,7 +46,7 @@ std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noex
 double smallestDihedral(const TetMesh& mesh) noexcept;
 
 /// Dihedral angle of a tetrahedron of these points that is nearest to 0 or 180 degrees, from there; -1 where it is flipped
-/// [degrees].
+/// or a point is no number [degrees].
 double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept;
 
 /// @param tissues  with row, voxels and thickness; the rest is filled in

@@ -37,6 +37,39 @@ volume::Box disturbed(const chainmail::DisplacedLattice& shape)
     return box;
 }
 
+constexpr int reach = 3;  // how many nodes displacements are continued off the tissue
+
+// Gives nodes off the tissue the mean of the neighbours that have a displacement. Programs that interpolate between all
+// nodes would mix nothing into the tissue at the skin.
+void continueOutwards(const chainmail::Lattice& lattice, std::vector<Vec3f>& u)
+{
+    const volume::NodeGrid& grid = lattice.grid;
+    std::vector<std::uint8_t> has = lattice.tissue;  // not 0 where a node has a displacement
+    std::vector<std::pair<std::size_t, Vec3f>> found;
+    for (int layer = 0; layer < reach; ++layer) {
+        found.clear();
+        volume::forEachIndex(Index3(0), grid.size - 1, [&](Index3 n) {
+            Vec3f sum(0.0F);
+            float count = 0.0F;
+            for (int side = 0; side < 6 && has[grid.offset(n)] == 0; ++side) {
+                Index3 beside = n;
+                beside[side / 2] += side % 2 == 0 ? -1 : 1;
+                if (grid.contains(beside) && has[grid.offset(beside)] != 0) {
+                    sum += u[grid.offset(beside)];
+                    count += 1.0F;
+                }
+            }
+            if (count > 0.0F) {
+                found.emplace_back(grid.offset(n), sum / count);
+            }
+        });
+        for (const auto& [node, mean] : found) {
+            u[node] = mean;
+            has[node] = 1;
+        }
+    }
+}
+
 bool inside(const volume::Box& box, Vec3 p)
 {
     return p.x >= box.low.x && p.y >= box.low.y && p.z >= box.low.z && p.x <= box.high.x && p.y <= box.high.y &&
@@ -134,6 +167,7 @@ volume::LabelImage DeformedState::labels() const
 std::vector<Vec3f> DeformedState::displacement() const
 {
     std::vector<Vec3f> out(shape().u().begin(), shape().u().end());
+    continueOutwards(shape().lattice(), out);
     for (Vec3f& u : out) {
         u *= 1e3F;
     }

@@ -183,16 +183,26 @@ void OutputFile::write(std::string_view text)
     write(std::as_bytes(std::span(text)));
 }
 
-void OutputFile::finish()
+void OutputFile::close()
 {
+    if (!impl_->out.is_open()) {
+        return;
+    }
     impl_->endPacking();
     errno = 0;
     impl_->out.close();
-    std::error_code failed;
-    if (impl_->out) {
-        std::filesystem::rename(impl_->part, impl_->file, failed);
+    if (!impl_->out) {
+        impl_->fail();
     }
-    if (!impl_->out || failed) {
+}
+
+void OutputFile::finish()
+{
+    close();
+    errno = 0;
+    std::error_code failed;
+    std::filesystem::rename(impl_->part, impl_->file, failed);
+    if (failed) {
         impl_->fail();
     }
     impl_->part.clear();

@@ -142,6 +142,18 @@ Bytes headerOf(const VoxelStream& voxels, int intent, std::size_t voxelStart)
     return h;
 }
 
+// Text in a CDATA section, which it must not end.
+std::string characterData(const std::string& text)
+{
+    std::string out = "<![CDATA[";
+    std::size_t at = 0;
+    for (auto end = text.find("]]>"); end != std::string::npos; end = text.find("]]>", at)) {
+        out += text.substr(at, end + 2 - at) + "]]><![CDATA[";
+        at = end + 2;
+    }
+    return out + text.substr(at) + "]]>";
+}
+
 // Caret's label table, which TotalSegmentator and Connectome Workbench write too.
 std::string labelTable(std::span<const ExportedSegment> segments)
 {
@@ -150,9 +162,9 @@ std::string labelTable(std::span<const ExportedSegment> segments)
         "<LabelTable>\n";
     for (const ExportedSegment& s : segments) {
         const auto colour = s.label.colour.value_or(std::array<std::uint8_t, 3>{128, 128, 128});
-        out += fmt::format(
-            "<Label Key=\"{}\" Red=\"{:.9g}\" Green=\"{:.9g}\" Blue=\"{:.9g}\" Alpha=\"1\"><![CDATA[{}]]></Label>\n",
-            s.label.value, colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0, s.label.name);
+        out += fmt::format("<Label Key=\"{}\" Red=\"{:.9g}\" Green=\"{:.9g}\" Blue=\"{:.9g}\" Alpha=\"1\">{}</Label>\n",
+                           s.label.value, colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0,
+                           characterData(s.label.name));
     }
     return out + "</LabelTable>\n<VolumeType><![CDATA[Label]]></VolumeType>\n</VolumeInformation>\n</CaretExtension>\n";
 }

@@ -27,6 +27,21 @@ bool isDataOf(const std::filesystem::path& header, const std::filesystem::path& 
     return false;
 }
 
+// Header and data appear together, once there was room for both.
+void finishBoth(OutputFile& data, const std::filesystem::path& raw, OutputFile& header)
+{
+    data.close();
+    header.close();
+    data.finish();
+    try {
+        header.finish();
+    } catch (const std::runtime_error&) {
+        std::error_code ignored;
+        std::filesystem::remove(raw, ignored);  // no header, or an older one, tells what they are
+        throw;
+    }
+}
+
 std::string vectorText(Vec3 v)
 {
     return fmt::format("({:.17g},{:.17g},{:.17g})", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
@@ -90,19 +105,18 @@ void writeMeta(const std::filesystem::path& file, const VoxelStream& voxels, con
                           : c == Component::u16 ? "MET_USHORT"
                                                 : "MET_FLOAT",
                           apart ? raw.filename().string() : "LOCAL");
-    if (apart) {
-        refuseIf(std::filesystem::exists(raw) && !isDataOf(file, raw), raw,
-                 "is there and belongs to another file: choose another name for {}", file.filename().native());
-        OutputFile data(raw);
-        writeSlices(data, voxels, false, options);
-        data.finish();
-    }
+    refuseIf(apart && std::filesystem::exists(raw) && !isDataOf(file, raw), raw,
+             "is there and belongs to another file: choose another name for {}", file.filename().native());
     OutputFile out(file);
     out.write(header);
     if (!apart) {
         writeSlices(out, voxels, false, options);
+        out.finish();
+        return;
     }
-    out.finish();
+    OutputFile data(raw);
+    writeSlices(data, voxels, false, options);
+    finishBoth(data, raw, out);
 }
 
 void writeNrrd(const std::filesystem::path& file, const VoxelStream& voxels, std::span<const ExportedSegment> segments,

@@ -27,6 +27,9 @@ public:
     void begin(Packing packing);
     void write(std::span<const std::byte> bytes);
     void write(std::string_view text);
+    /// All bytes are on the disk, still under another name.
+    void close();
+    /// Puts it under its name, closed or not.
     void finish();
 
 private:

@@ -20,7 +20,12 @@ struct ImportOptions {
     /// A probability from which a voxel is taken as set (DICOM SEG of type FRACTIONAL); none: 0.5. Labels without
     /// probabilities are refused with one.
     std::optional<float> fractionalThreshold;
-    std::string series;  // SeriesInstanceUID to take where a folder holds several
+    std::string series;  // SeriesInstanceUID to take where a folder holds several; a file is what it is
+    /// Of an image: series that the labels were made of (ImportedLabels::madeOf). Where a folder holds several, none is
+    /// named and one of them is of these, it is taken.
+    std::vector<std::string> seriesOfLabels = {};
+    /// Distance between the slices of a DICOM SEG whose frames leave slices out and that does not say it [m]; 0: refuse it.
+    double sliceSpacing = 0;
     /// Grids whose voxel axes are not at right angles (tilted gantry, affine registration) are refused unless the caller
     /// resamples them. Images are read in any case.
     bool sheared = false;
@@ -53,6 +58,8 @@ struct ImportedLabels {
     std::vector<Overlap> overlaps;       // a voxel of `lost` is counted once, against the segment that has it now
     std::vector<std::string> warnings;   // geometry that was chosen among several, and the like
     std::vector<Renumbered> renumbered;  // by the value in the file; empty without options.renumber
+    std::string frame;                   // DICOM's Frame of Reference UID; empty where the file has none
+    std::vector<std::string> madeOf;     // SeriesInstanceUIDs of the images that a DICOM SEG says it was made of
 
     /// The value that the file has for a label.
     std::int64_t originalOf(std::uint16_t value) const noexcept;
@@ -65,6 +72,7 @@ struct ImportedImage {
     std::vector<float> values;          // size.x * size.y * size.z, x fastest; finite
     std::string what;                   // "HU" where the file says that it is CT, else empty
     std::vector<std::string> warnings;  // as of labels
+    std::string frame;                  // as of labels: places of two frames have nothing to do with each other
 };
 
 /// Reads a label map. A file: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd),
@@ -75,6 +83,10 @@ ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptio
 
 /// Reads an intensity image from the same formats, slope and intercept applied. Throws like importLabels().
 ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options = {});
+
+/// The files that importLabels() or importImage() would read: those of a folder that are of its kinds, a header and its
+/// data. Throws like these.
+std::vector<std::filesystem::path> filesOf(const std::filesystem::path& path);
 
 /// Largest deviation of the angles between voxel axes from a right angle [rad].
 double shearOf(const Affine& affine) noexcept;

@@ -26,11 +26,11 @@ _IN_PYTHON = [(re.compile(pattern), ours) for pattern, ours in [
     (r"(?:add|give) --voxel MM", "give voxel=, in metres"),
     (r"with --body-from-hull MM", "with body_from_hull=, in metres"),
 ]]
-_ARGUMENTS = {"set", "map", "default-tissue", "image", "image-unit", "stiffness-from", "voxel", "body-from-image", "body-from-hull",
+_ARGUMENTS = {"set", "map", "default-tissue", "image", "image-unit", "image-series", "ignore-frame-of-reference", "stiffness-from", "voxel", "body-from-image", "body-from-hull",
               "tissues", "trainee"}
 _OPTION = re.compile(r"(?<![\w/-])(?<!palpate import )--([a-z]+(?:-[a-z]+)*)")
 _OF_IMPORT = re.compile(r"(?<!palpate import )--(volume|image-volume|series|axes|image-axes|dicom-labels|round|renumber|overlap|"
-                        r"threshold|names|crop)\b")
+                        r"threshold|slice-spacing|names|crop)\b")
 
 
 def in_python(message: str) -> str:

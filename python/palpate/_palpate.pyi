@@ -32,6 +32,8 @@ class Volume:
         default_tissue: str = "",
         image: _Path = "",
         image_unit: str = "",
+        image_series: str = "",
+        ignore_frame_of_reference: bool = False,
         stiffness_from: str = "",
         voxel: float = 0.0,
         body_from_image: bool = False,
@@ -47,6 +49,8 @@ class Volume:
             default_tissue: of labels that nothing else names.
             image: CT or MR of the same patient, on any grid.
             image_unit: "HU" where the image's file does not say so.
+            image_series: SeriesInstanceUID where the image is a folder with several; "": that which the DICOM SEG names.
+            ignore_frame_of_reference: accept an image whose DICOM frame of reference is not that of the labels.
             stiffness_from: "hu" or a TOML file: the image scales Young's modulus.
             voxel: edge of new, cubic voxels [m]; 0: as they are.
             body_from_image: find the body around the labels in the image, which is CT.

@@ -122,6 +122,38 @@ TEST_F(ImportOptions, ARenumberedValueTakesNoNameOfAnother)
         2U);
 }
 
+// The data beside a header, a mask of a folder, the names that are found by themselves.
+TEST_F(ImportOptions, FiguresAndMapsReplaceNothingThatIsReadOrEdited)
+{
+    const std::string whole = metaImage<std::uint8_t>("MET_UCHAR", {1, 2, 2}), local = "LOCAL\n";
+    const std::size_t head = whole.find(local);
+    fs::create_directories(folder / "labelsTr");
+    fs::create_directories(folder / "masks");
+    const std::string raw = write("z.raw", whole.substr(head + local.size())),
+                      pair = write("z.mhd", whole.substr(0, head) + "z.raw\n"), mask = write("masks/a.mha", whole),
+                      listed = write("labelsTr/one.mha", whole),
+                      names = write("dataset.json", R"({"labels": {"fat": 1, "liver": 2}})");
+    const std::vector<std::array<std::string, 3>> cases{{pair, one, raw},
+                                                        {one, pair, raw},
+                                                        {folder / "masks", one, mask},
+                                                        {one, folder / "masks", mask},
+                                                        {listed, one, names}};
+    for (const auto& [input, image, output] : cases) {
+        const std::string before = readText(output);
+        refused(input, with({"--image", image, "--json", output}),
+                output + ": is a file that is read, and would be replaced");
+        EXPECT_EQ(readText(output), before);
+    }
+    const std::string figures = write("masks/figures.json", "{}");
+    EXPECT_EQ(palpate(import(pair, with({"--json", figures}))).status, 0);
+    EXPECT_EQ(palpate(import(pair, with({"--json", figures}))).status, 0) << "figures of before are replaced";
+    const std::string map = folder / "m.toml";
+    EXPECT_EQ(palpate({"import", one, "--write-map", map}).status, 0);
+    writeText(map, "edited");
+    expectRefusal({"import", one, "--write-map", map}, map + ": is there already");
+    EXPECT_EQ(readText(map), "edited");
+}
+
 TEST_F(ImportOptions, NearlyWholeValuesAreRoundedForWhoAsks)
 {
     const std::string file = write("near.mha", metaImage<float>("MET_FLOAT", {0.99999994F, 2.0003F})),

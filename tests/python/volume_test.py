@@ -1,5 +1,6 @@
 import gc
 import os
+import tempfile
 import unittest
 
 import numpy as np
@@ -121,6 +122,13 @@ class FromNumpy(InFolder):
     def test_a_unit_without_an_image_is_refused(self):
         with self.assertRaisesRegex(ValueError, "image_unit: needs the image"):
             palpate.Volume.from_numpy(cube(), AFFINE, TISSUES, image_unit="HU")
+
+    def test_arguments_of_an_image_need_one(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "a.vdb")
+            for more in ({"image_series": "1.2"}, {"ignore_frame_of_reference": True}):
+                with self.subTest(more), self.assertRaisesRegex(palpate.Error, f"^{next(iter(more))}: needs the image: give image="):
+                    palpate.Volume.import_(file, **more)
 
     def test_a_phantoms_parameter_without_a_number_is_named(self):
         with self.assertRaisesRegex(TypeError, "width_mm: give a number or a word, not None"):

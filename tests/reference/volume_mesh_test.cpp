@@ -285,6 +285,20 @@ TEST(MeshImprove, KeepsTheBodyAndRaisesTheWorstAngle)
     }
 }
 
+// Two points of a surface in one place, as surface nets may have them: facets there have no normal, and no end was found.
+TEST(MeshImprove, FacetsWithoutAreaHoldTheirPoints)
+{
+    TetMesh mesh = jittered(2, 4e-3, 1);
+    const auto facet = surfacesOf(mesh, AllPoints::yes).facets[20].points;
+    mesh.points[facet[1]] = mesh.points[facet[0]];
+    const Vec3 place = mesh.points[facet[0]];
+    improveAngles(mesh, 20.0, Moving::surfaces);
+    EXPECT_TRUE(std::ranges::any_of(mesh.points, [&](Vec3 p) { return p == place; }));
+    for (const Vec3 p : mesh.points) {
+        EXPECT_TRUE(std::isfinite(p.x + p.y + p.z));
+    }
+}
+
 // Without moves, and surfaces as they are, as long as no tetrahedron goes over to another tissue.
 TEST(MeshImprove, SwapsAloneLeaveSurfacesAndVolumes)
 {

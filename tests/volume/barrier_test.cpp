@@ -37,6 +37,8 @@ TEST(Barrier, LabelsComeOverAsTheyAre)
                     {4, "", "", {}, ""}};
     labels.overlaps = {{3, 4, 70000000000}};
     labels.warnings = {"one", "", "three"};
+    labels.frame = "1.2.3";
+    labels.madeOf = {"4.5", "6.7"};
     const pid_t here = ::getpid();
     const ImportedLabels over = labelsOf([&](const ImportOptions&) {
         EXPECT_NE(::getpid(), here);
@@ -46,6 +48,8 @@ TEST(Barrier, LabelsComeOverAsTheyAre)
     EXPECT_EQ(over.image.affine.linear, labels.image.affine.linear);
     EXPECT_EQ(over.image.affine.origin, labels.image.affine.origin);
     EXPECT_EQ(over.image.values, labels.image.values);
+    EXPECT_EQ(over.frame, labels.frame);
+    EXPECT_EQ(over.madeOf, labels.madeOf);
     ASSERT_EQ(over.names.size(), 2U);
     for (std::size_t i = 0; i < 2; ++i) {
         EXPECT_EQ(over.names[i].value, labels.names[i].value);

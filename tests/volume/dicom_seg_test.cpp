@@ -44,6 +44,7 @@ struct Segmentation {
     int segments = 2;
     int slices = 6;
     std::function<int(int, int, int, int)> inside;
+    const char* between = "3";  // SpacingBetweenSlices [mm]; empty: not there
 };
 
 class DicomSeg : public ::testing::Test {
@@ -82,7 +83,13 @@ protected:
         shared->findOrCreateSequenceItem(DCM_PixelMeasuresSequence, measures);
         measures->putAndInsertString(DCM_PixelSpacing, "2\\0.5");
         measures->putAndInsertString(DCM_SliceThickness, "3");
-        measures->putAndInsertString(DCM_SpacingBetweenSlices, "3");
+        if (*s.between != '\0') {
+            measures->putAndInsertString(DCM_SpacingBetweenSlices, s.between);
+        }
+        DcmItem* series = nullptr;
+        data.findOrCreateSequenceItem(DCM_ReferencedSeriesSequence, series);
+        series->putAndInsertString(DCM_SeriesInstanceUID, "1.2.3");
+        data.putAndInsertString(DCM_FrameOfReferenceUID, "1.2.7");
         shared->findOrCreateSequenceItem(DCM_PlaneOrientationSequence, direction);
         direction->putAndInsertString(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
         std::vector<int> values;
@@ -238,6 +245,37 @@ TEST_F(DicomSeg, LabelMapsComeInAndUnknownSegmentsAreRefused)
     } catch (const std::runtime_error& e) {
         EXPECT_NE(std::string(e.what()).find("segment 3, which its list does not hold"), std::string::npos) << e.what();
     }
+}
+
+TEST_F(DicomSeg, SaysItsFrameOfReferenceAndWhatItWasMadeOf)
+{
+    const ImportedLabels labels = importLabels(write({"BINARY", 1, 1, 2, [](int, int, int, int) { return 1; }}));
+    EXPECT_EQ(labels.frame, "1.2.7");
+    EXPECT_EQ(labels.madeOf, std::vector<std::string>{"1.2.3"});
+}
+
+// Frames in slices 0, 2 and 4 of 3 mm: 6 mm is the distance of slices with gaps, or has slices without a frame in it.
+TEST_F(DicomSeg, ADistanceThatNobodySaysIsNotGuessed)
+{
+    Segmentation s{"BINARY", 1, 1, 5, [](int, int, int, int k) { return k % 2 == 0 ? 1 : 0; }};
+    EXPECT_EQ(importLabels(write(s)).image.size.z, 5);
+    ImportOptions options;
+    options.sliceSpacing = 3e-3;
+    EXPECT_NE(tests::errorOf([&] { importLabels(folder / "seg.dcm", options); }).find("leave --slice-spacing out"),
+              std::string::npos);
+    s.between = "";
+    write(s);
+    EXPECT_NE(reason().find("its frames are 6 mm apart and 3 mm thick"), std::string::npos) << reason();
+    const ImportedLabels labels = importLabels(folder / "seg.dcm", options);
+    EXPECT_EQ(labels.image.size.z, 5);
+    EXPECT_NEAR(labels.image.affine.spacing().z, 3e-3, 1e-12);
+    options.sliceSpacing = 6e-3;
+    EXPECT_EQ(importLabels(folder / "seg.dcm", options).image.size.z, 3);
+    options.sliceSpacing = 4e-3;
+    EXPECT_NE(tests::errorOf([&] { importLabels(folder / "seg.dcm", options); }).find("which is no multiple of it"),
+              std::string::npos);
+    s.inside = [](int, int, int, int k) { return k == 0 || k > 2 ? 1 : 0; };
+    EXPECT_EQ(importLabels(write(s)).image.size.z, 5) << "two frames side by side say it";
 }
 
 // Eight pixels to a byte, the first in the lowest bit; each frame begins with a byte of its own.

@@ -237,7 +237,7 @@ TEST_F(Dicom, WhatDoesNotBelongTogetherIsRefused)
         fs::remove(folder / "odd");
     };
     odd({Vec3(10, 20, 45), {0, 1, 0}, {0, 0, 1}}, "different directions");
-    odd({Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "9.9"}, "2 series: say which with --series");
+    odd({Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "9.9"}, "2 series: say which with --image-series");
     odd({Vec3(10, 20, 45),
          {1, 0, 0},
          {0, 1, 0},
@@ -278,7 +278,7 @@ TEST_F(Dicom, WhatDoesNotBelongTogetherIsRefused)
     options.series = "1.2.3";
     EXPECT_EQ(reason(options), "");
     options.series = "4.4";
-    EXPECT_NE(reason(options).find("--series 4.4 is not there: name one of these: 1.2.3"), std::string::npos)
+    EXPECT_NE(reason(options).find("--image-series 4.4 is not there: name one of these: 1.2.3"), std::string::npos)
         << reason(options);
     fs::remove(folder / "other");
     for (const char* name : {"a", "b", "c", "d", "e"}) {
@@ -287,6 +287,96 @@ TEST_F(Dicom, WhatDoesNotBelongTogetherIsRefused)
                      }});
     }
     EXPECT_NE(reason().find("promises 7 x 500 x 1 pixels"), std::string::npos) << reason();
+}
+
+// CT, another CT and a segmentation lie in one folder.
+TEST_F(Dicom, TheSeriesOfTheLabelsIsTakenAndSegmentationsAreNoImages)
+{
+    writeSeries({1, 0, 0}, {0, 1, 0}, 3);
+    write("seg", {Vec3(0), {1, 0, 0}, {0, 1, 0}, "6.6", "", 0, [](DcmDataset& d) {
+                      DcmItem* item = nullptr;
+                      d.putAndInsertString(DCM_Modality, "SEG");
+                      d.putAndInsertString(DCM_SegmentationType, "BINARY");
+                      d.findOrCreateSequenceItem(DCM_SegmentSequence, item);
+                  }});
+    expectValues(importImage(folder));
+    ImportOptions options;
+    options.series = "6.6";
+    EXPECT_NE(reason(options).find("--image-series 6.6 is not there"), std::string::npos) << reason(options);
+    write("other", {Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "9.9"});
+    options.series = "";
+    options.seriesOfLabels = {"5.5", "1.2.3"};
+    const ImportedImage image = importImage(folder, options);
+    expectValues(image);
+    ASSERT_EQ(image.warnings.size(), 1U);
+    EXPECT_NE(image.warnings[0].find("1.2.3 is taken: the labels were made of it"), std::string::npos);
+    options.seriesOfLabels = {"9.9", "1.2.3"};
+    EXPECT_NE(reason(options).find("2 series: say which with --image-series"), std::string::npos) << reason(options);
+    options.series = "9.9";
+    EXPECT_EQ(importImage(folder / "a", options).values.size(), 35U) << "a file is what it is";
+}
+
+// The first or last slice would be missing without a word.
+TEST_F(Dicom, DamagedFilesOfAFolderAreRefusedByName)
+{
+    writeSeries({1, 0, 0}, {0, 1, 0}, 3);
+    const auto refused = [&](const std::string& name, const std::string& bytes, const std::string& words) {
+        std::ofstream(folder / name, std::ios::binary) << bytes;
+        EXPECT_NE(reason().find("/" + name + ": " + words), std::string::npos) << reason();
+        fs::remove(folder / name);
+    };
+    refused("f", "", "is empty, where a DICOM file belongs");
+    refused("e.dcm", std::string(500, '\0'), "does not begin as DICOM does");
+    const auto last = [&](const std::string& series, const std::vector<DcmTagKey>& lost) {
+        write("b", {Vec3(10, 20, 42), {1, 0, 0}, {0, 1, 0}, series, "", 4, [&lost](DcmDataset& d) {
+                        for (const DcmTagKey& tag : lost) {
+                            d.findAndDeleteElement(tag);
+                        }
+                    }});
+    };
+    last("1.2.3", {DCM_PixelData, DCM_SeriesInstanceUID, DCM_Rows});
+    EXPECT_NE(reason().find("/b: is DICOM that belongs to no series"), std::string::npos) << reason();
+    last("1.2.3", {DCM_PixelData, DCM_Rows});
+    EXPECT_NE(reason().find("/b: is a DICOM image without its pixels"), std::string::npos) << reason();
+    last("9.9", {DCM_PixelData});
+    EXPECT_NE(reason().find("/b: is a DICOM image without its pixels"), std::string::npos) << reason();
+    ImportOptions options;
+    options.series = "1.2.3";
+    EXPECT_EQ(reason(options), "") << "the other series was not asked for";
+    std::ofstream(folder / "readme.txt") << "";
+    EXPECT_EQ(reason(options), "");
+}
+
+// What gives values their unit is read, or the file is not.
+TEST_F(Dicom, AScaleThatIsNoNumberAndATableOfValuesAreRefused)
+{
+    const auto with = [&](const std::function<void(DcmDataset&)>& change) {
+        write("a", {Vec3(0), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", 0, change});
+        return reason();
+    };
+    const std::string slope = with([](DcmDataset& d) { d.putAndInsertString(DCM_RescaleSlope, "nan"); });
+    EXPECT_NE(slope.find("its rescale slope or intercept is 'nan', which is no number"), std::string::npos) << slope;
+    const std::string table = with([](DcmDataset& d) {
+        DcmItem* item = nullptr;
+        d.findOrCreateSequenceItem(DCM_ModalityLUTSequence, item);
+    });
+    EXPECT_NE(table.find("has a Modality LUT"), std::string::npos) << table;
+    EXPECT_EQ(with([](DcmDataset& d) { d.putAndInsertString(DCM_RescaleSlope, ""); }), "");
+}
+
+TEST_F(Dicom, SlicesOfTwoFramesOfReferenceAreRefused)
+{
+    const auto inFrame = [&](const char* name, int k, const char* frame) {
+        write(name, {Vec3(0, 0, k), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", k, [frame](DcmDataset& d) {
+                         d.putAndInsertString(DCM_FrameOfReferenceUID, frame);
+                     }});
+    };
+    inFrame("a", 0, "7.1");
+    inFrame("b", 1, "7.1");
+    inFrame("c", 2, "");
+    EXPECT_EQ(importImage(folder).frame, "7.1");
+    inFrame("c", 2, "7.2");
+    EXPECT_NE(reason().find("different frames of reference (7.1 in a, 7.2 in c)"), std::string::npos) << reason();
 }
 
 // A gantry tilted by 14 degrees: slices stay upright and shift, so the grid is sheared by that angle.

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tests/volume/itk_compiler.h>
+#include <unistd.h>
 
 #include <itkImageFileReader.h>
 #include <itkMetaImageIO.h>
@@ -195,7 +196,7 @@ TEST(Export, NamesColoursAndTermsOfSegmentsAreKept)
         {5, "left \"lung\"", "lung", std::array<std::uint8_t, 3>{12, 255, 0},
          "c~SCT^123037004^Anatomical Structure~SCT^39607008^Lung~SCT^7771000^Left~a~^^~^^"},
         {9, "now\\here", "fat"},
-        {200, "M\xc3\xbcller's \\duct\\n", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
+        {200, "M\xc3\xbcller's ]]> \\duct]]>]]\\n</Label>", "duct", std::array<std::uint8_t, 3>{1, 2, 3}, ""}};
     for (const std::string ending : {".seg.nrrd", ".nii.gz"}) {
         SCOPED_TRACE(ending);
         const std::string file = folder / ("s" + ending);
@@ -270,6 +271,12 @@ TEST(Export, RefusesOnOneLineAndLeavesNothing)
     std::filesystem::remove(folder / "ct.raw");
     EXPECT_EQ(errorOf(folder / "ct.mhd"), "");
     EXPECT_EQ(errorOf(folder / "ct.mhd"), "") << "its own is replaced";
+
+    // No room for the header, where a folder is: neither part appears.
+    std::filesystem::create_directory(folder / fmt::format("b.mhd.{}.part", ::getpid()));
+    EXPECT_NE(errorOf(folder / "b.mhd"), "");
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.raw"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "b.mhd"));
 }
 
 // Writers that trusted the grid read past the end of what they were given.

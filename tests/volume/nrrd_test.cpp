@@ -217,6 +217,41 @@ TEST_F(Nrrd, LayersComeInWhicheverAxisListsThem)
     EXPECT_EQ(first.names[2].value, 3);  // 1 is taken
 }
 
+// A voxel's layer and value are one segment, in a file of one layer too.
+TEST_F(Nrrd, SegmentsThatAVoxelCannotTellApartAreRefused)
+{
+    const auto two = [](int value, const std::string& layer) {
+        const std::string layers = layer.empty() ? "" : "Segment0_Layer:=0\nSegment1_Layer:=" + layer + "\n";
+        return head("raw", fmt::format("Segment0_ID:=a\nSegment0_Name:=liver\nSegment0_LabelValue:=1\nSegment1_ID:=b\n"
+                                       "Segment1_Name:=bone\nSegment1_LabelValue:={}\n{}",
+                                       value, layers)) +
+               bytesOf(std::vector<std::uint16_t>(120, 1));
+    };
+    EXPECT_EQ(reason(two(2, "0")), "");
+    EXPECT_EQ(reason(two(2, "")), "") << "there is one layer only";
+    EXPECT_NE(reason(two(1, "0")).find("'liver' and 'bone' both have value 1 of layer 0"), std::string::npos);
+    EXPECT_NE(reason(two(1, "1")).find("'bone' is said to be in layer 1, but there is one layer"), std::string::npos);
+    std::string layered = Layers().file(0);
+    layered.replace(layered.find("Segment2_Layer:=1"), 17, "Segment2_Layer:=0");
+    EXPECT_NE(reason(layered).find("'large' and 'small' both have value 1 of layer 0"), std::string::npos);
+    layered.replace(layered.find("Segment2_Layer:=0"), 17, "Segment2_Layer:=2");
+    EXPECT_NE(reason(layered).find("in layer 2, but there are 2 layers"), std::string::npos);
+}
+
+TEST_F(Nrrd, ColoursAreNoVolumes)
+{
+    for (const char* kind : {"RGB-color", "RGBA-color", "HSV-color", "complex"}) {
+        const std::string file = fmt::format(
+            "NRRD0004\ntype: uchar\ndimension: 4\nspace: LPS\nsizes: 3 4 5 6\nspace directions: none (1,0,0) (0,1,0) "
+            "(0,0,1)\nkinds: {} domain domain domain\nencoding: raw\n\n{}",
+            kind, std::string(360, '\1'));
+        ImportOptions options;
+        for (options.volume = 0; options.volume < 2; ++options.volume) {
+            EXPECT_NE(reason(file, options).find("has colours or complex numbers as voxels"), std::string::npos) << kind;
+        }
+    }
+}
+
 // Names go to terminals and into UTF-8 files: no control character gets there, and Latin-1 is what it was meant to be.
 TEST_F(Nrrd, NamesAreTextWhateverBytesTheyAre)
 {

@@ -283,7 +283,34 @@ TEST_F(ReadingRules, LabelsBeyondTheRangeAreRenumberedOnlyForWhoSaysSo)
     std::vector<std::int64_t> huge(24, 1);
     huge[0] = std::int64_t{1} << 60;
     const fs::path beyond = write("h.nii", NiftiFields(1024, 64).oriented().bytes + bytesOf(huge));
-    EXPECT_NE(reason(beyond, options).find("whole numbers over 2^53 cannot be told apart"), std::string::npos);
+    EXPECT_NE(reason(beyond, options).find("whole numbers from 2^53 on cannot be told apart"), std::string::npos);
+    huge[0] = (std::int64_t{1} << 53) + 1;  // 2^53 as a double
+    const fs::path next = write("n.nii", NiftiFields(1024, 64).oriented().bytes + bytesOf(huge));
+    EXPECT_NE(reason(next, options).find("from 2^53 on cannot be told apart"), std::string::npos);
+    huge[0] = (std::int64_t{1} << 53) - 1;
+    EXPECT_EQ(reason(write("n.nii", NiftiFields(1024, 64).oriented().bytes + bytesOf(huge)), options), "");
+}
+
+// value = slope * stored + offset, as in the other formats.
+TEST_F(ReadingRules, TheSlopeOfAMetaImageIsAppliedAndNothingIsSaidTwice)
+{
+    const std::string slope = "ElementToIntensityFunctionSlope = 2\n", offset = "ElementToIntensityFunctionOffset = 1\n";
+    const std::string voxels = bytesOf(smallRamp<std::uint8_t>());
+    const fs::path file = write("s.mha", smallMeta(patientAxes + slope + offset) + voxels);
+    const std::vector<std::uint16_t> labels = importLabels(file).image.values;
+    const std::vector<float> image = importImage(file).values;
+    ASSERT_EQ(labels.size(), 24U);
+    for (std::size_t i = 0; i < 24; ++i) {
+        EXPECT_EQ(labels[i], 2 * (i % 5) + 1);
+        EXPECT_EQ(image[i], static_cast<float>(2 * (i % 5) + 1));
+    }
+    EXPECT_NE(reason(write("s.mha", smallMeta("ElementToIntensityFunctionSlope = 0\n") + voxels)).find("Slope = 0"),
+              std::string::npos);
+    const std::string twice = slope + "ElementToIntensityFunctionSlope = 3\n";
+    EXPECT_NE(reason(write("s.mha", smallMeta(twice) + voxels)).find("gives 'ElementToIntensityFunctionSlope' twice"),
+              std::string::npos);
+    EXPECT_EQ(reason(write("s.mha", smallMeta(patientAxes + slope + slope) + voxels)), "")
+        << "VICTRE's headers repeat a line";
 }
 
 TEST_F(ReadingRules, NearlyWholeLabelsAreRoundedOnlyForWhoSaysSo)

@@ -139,14 +139,14 @@ bool pass(const End& end, ImportedLabels& labels)
 {
     return pass(end, labels.image.size) && pass(end, labels.image.affine) && pass(end, labels.image.values) &&
            pass(end, labels.names) && pass(end, labels.overlaps) && pass(end, labels.warnings) &&
-           pass(end, labels.renumbered);
+           pass(end, labels.renumbered) && pass(end, labels.frame) && pass(end, labels.madeOf);
 }
 
 template <class End>
 bool pass(const End& end, ImportedImage& image)
 {
     return pass(end, image.size) && pass(end, image.affine) && pass(end, image.values) && pass(end, image.what) &&
-           pass(end, image.warnings);
+           pass(end, image.warnings) && pass(end, image.frame);
 }
 
 // A failed assertion leaves neither text nor a core behind; ours is the one line that is thrown.

@@ -9,6 +9,8 @@ using Files = std::vector<std::filesystem::path>;
 
 /// True for a file that begins as DICOM does, with a preamble or without.
 bool isDicom(const std::filesystem::path& file);
+/// The files in a folder that are read: volumes with the other files of theirs, and DICOM.
+Files filesOfFolder(const std::filesystem::path& folder);
 /// The DICOM files in a folder, by name; refuses a folder without any.
 Files dicomFilesIn(const std::filesystem::path& folder);
 

@@ -52,6 +52,16 @@ bool vector3(DcmItem& item, const DcmTagKey& tag, unsigned long first, Vec3& out
     return there;
 }
 
+// Of what gives values their unit a wrong text is not passed over.
+double scale(DcmItem& item, const DcmTagKey& tag, double fallback, const DicomObject& object)
+{
+    const std::string said = text(item, tag);
+    const double value = said.empty() ? fallback : number(item, tag, std::nan(""));
+    refuseIf(!std::isfinite(value), object.file,
+             "its rescale slope or intercept is '{}', which is no number: get the file again", said.substr(0, 30));
+    return value;
+}
+
 // What one place of the file says about where frames are; later places say more. The parts that are there so far.
 struct Placing {
     DicomFrame frame;
@@ -80,8 +90,8 @@ void readPlace(DcmItem& item, Placing& place, DicomObject& object)
     }
     object.thickness = number(item, DCM_SliceThickness, 1e3 * object.thickness) * 1e-3;
     object.betweenSlices = number(item, DCM_SpacingBetweenSlices, 1e3 * object.betweenSlices) * 1e-3;
-    frame.slope = number(item, DCM_RescaleSlope, frame.slope);
-    frame.intercept = number(item, DCM_RescaleIntercept, frame.intercept);
+    frame.slope = scale(item, DCM_RescaleSlope, frame.slope, object);
+    frame.intercept = scale(item, DCM_RescaleIntercept, frame.intercept, object);
     if (object.rescaleType.empty()) {
         object.rescaleType = text(item, DCM_RescaleType);
     }
@@ -203,8 +213,24 @@ std::array<std::uint8_t, 3> rgb(double l, double a, double b)
     return out;
 }
 
+// The series that a segmentation was made of.
+std::vector<std::string> referencedSeries(DcmDataset& data)
+{
+    std::vector<std::string> out;
+    DcmSequenceOfItems* sequence = nullptr;
+    if (data.findAndGetSequence(DCM_ReferencedSeriesSequence, sequence).bad() || sequence == nullptr) {
+        return out;
+    }
+    for (DcmObject* entry = sequence->nextInContainer(nullptr); entry != nullptr;
+         entry = sequence->nextInContainer(entry)) {
+        out.push_back(text(dynamic_cast<DcmItem&>(*entry), DCM_SeriesInstanceUID));
+    }
+    return out;
+}
+
 void readSegments(DcmDataset& data, DicomObject& object)
 {
+    object.madeOf = referencedSeries(data);
     object.segmentationType = text(data, DCM_SegmentationType);
     object.maxFractional = whole(data, DCM_MaximumFractionalValue, 255);
     object.padding = whole(data, DCM_PixelPaddingValue, -1);
@@ -266,11 +292,15 @@ DicomObject readDicom(const std::filesystem::path& file)
     object.sopClass = text(data, DCM_SOPClassUID);
     object.instance = text(data, DCM_SOPInstanceUID);
     object.series = text(data, DCM_SeriesInstanceUID);
+    object.frame = text(data, DCM_FrameOfReferenceUID);
     object.description = text(data, DCM_SeriesDescription);
     object.modality = text(data, DCM_Modality);
     const std::string syntax = transferSyntaxOf(file);
     object.syntax = syntax.empty() ? DcmXfer(data.getOriginalXfer()).getXferID() : syntax;
+    object.directory = data.tagExists(DCM_DirectoryRecordSequence);
     object.pixels = data.tagExists(DCM_PixelData);
+    object.bare = data.tagExists(DCM_Rows) && !object.pixels && !data.tagExists(DCM_FloatPixelData) &&
+                  !data.tagExists(DCM_DoubleFloatPixelData);
     if (!object.pixels) {
         return object;
     }
@@ -282,6 +312,8 @@ DicomObject readDicom(const std::filesystem::path& file)
     object.highBit = whole(data, DCM_HighBit, object.bitsStored - 1);
     object.isSigned = whole(data, DCM_PixelRepresentation, 0) == 1;
     checkPixelFormat(object);
+    refuseIf(firstItem(&data, DCM_ModalityLUTSequence) != nullptr, file,
+             "has a Modality LUT, a table of values, which is not read: export it with rescale slope and intercept");
     readFrames(data, object);
     if (object.modality == "SEG" || data.tagExists(DCM_SegmentSequence)) {
         readSegments(data, object);

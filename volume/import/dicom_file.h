@@ -28,8 +28,10 @@ struct DicomFrame {
 /// What a DICOM file says besides its pixels.
 struct DicomObject {
     std::filesystem::path file;
-    std::string sopClass, instance, series, description, modality, syntax;
-    bool pixels = false;
+    std::string sopClass, instance, series, frame, description, modality, syntax;  // frame: Frame of Reference UID
+    bool directory = false;                                                        // a DICOMDIR
+    bool pixels = false;                                                           // of whole numbers
+    bool bare = false;  // it has rows, but no pixels of any kind: they are lost
     int columns = 0;
     int rows = 0;
     int samples = 1;
@@ -47,6 +49,7 @@ struct DicomObject {
     int maxFractional = 255;
     int padding = -1;  // a value that means background, -1 for none
     std::vector<LabelName> segments;
+    std::vector<std::string> madeOf;  // series that it refers to
 
     std::size_t pixelsPerFrame() const { return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows); }
 };

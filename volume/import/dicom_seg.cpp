@@ -41,25 +41,38 @@ void checkFrames(const DicomObject& object)
     }
 }
 
-// Distance between slices [m]: what the file says where all frames agree with it, else the smallest gap.
-double spacingOf(const DicomObject& object, const std::vector<double>& heights)
+// Distance between slices [m]: what file or user say where all frames agree with it, else the smallest gap. Where nobody
+// says it, a gap of several thicknesses is either the distance or has slices without a frame in it.
+double spacingOf(const DicomObject& object, const std::vector<double>& heights, double asked)
 {
+    refuseIf(asked > 0 && object.betweenSlices > 0, object.file,
+             "--slice-spacing {:g}: it says itself that its slices are {:g} mm apart: leave --slice-spacing out",
+             1e3 * asked, 1e3 * object.betweenSlices);
     double smallest = 0;
     for (std::size_t i = 1; i < heights.size(); ++i) {
         const double gap = heights[i] - heights[i - 1];
         smallest = gap > samePlace && (smallest == 0 || gap < smallest) ? gap : smallest;
     }
-    const double said = object.betweenSlices > 0 ? object.betweenSlices : object.thickness;
+    const bool certain = object.betweenSlices > 0 || asked > 0;
+    const double said = asked > 0 ? asked : object.betweenSlices > 0 ? object.betweenSlices : object.thickness;
     if (smallest == 0) {
         refuseIf(!(said > 0), object.file, "is one slice and does not say how thick: export it again");
         return said;
     }
     const double steps = smallest / said;
     const bool multiple = said > 0 && steps > 0.95 && std::abs(steps - std::round(steps)) < 0.02 * std::round(steps);
-    return multiple && object.betweenSlices > 0 ? smallest / std::round(steps) : smallest;
+    refuseIf(asked > 0 && !multiple, object.file,
+             "--slice-spacing {:g}: its frames are {:.4g} mm apart, which is no multiple of it: give the distance of the "
+             "image's slices",
+             1e3 * asked, 1e3 * smallest);
+    refuseIf(!certain && multiple && steps > 1.5, object.file,
+             "its frames are {:.4g} mm apart and {:.4g} mm thick, and it does not say how far apart slices are: give the "
+             "distance of the image's slices with --slice-spacing MM, for those without a frame lie between",
+             1e3 * smallest, 1e3 * object.thickness);
+    return multiple && certain ? smallest / std::round(steps) : smallest;
 }
 
-Grid gridOf(const DicomObject& object)
+Grid gridOf(const DicomObject& object, double askedSpacing)
 {
     checkFrames(object);
     const DicomFrame& any = object.frames[0];
@@ -70,7 +83,7 @@ Grid gridOf(const DicomObject& object)
     std::stable_sort(grid.frames.begin(), grid.frames.end(),
                      [&](const Placed& a, const Placed& b) { return height(a) < height(b); });
     const auto heights = base::mapped<double>(grid.frames, [&](const Placed& p) { return height(p); });
-    const double spacing = spacingOf(object, heights);
+    const double spacing = spacingOf(object, heights, askedSpacing);
     const Vec3 origin = grid.frames[0].frame->position;
     for (Placed& p : grid.frames) {
         const double steps = (height(p) - heights[0]) / spacing;
@@ -184,7 +197,7 @@ ImportedLabels readSegmentation(const DicomObject& object, const ImportOptions& 
     if (type != "FRACTIONAL") {
         refuseThreshold(object.file, options);
     }
-    const Grid grid = gridOf(object);
+    const Grid grid = gridOf(object, options.sliceSpacing);
     ImportedLabels out;
     out.image.size = grid.size;
     out.image.affine = grid.affine;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <set>
 
 namespace palpate::volume {
 
@@ -105,6 +106,28 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
     return out;
 }
 
+// The DICOM files among those of a folder. One that is empty, or damaged from its first byte on, is a slice that would be
+// missing without a word.
+Files dicomAmong(const Files& files)
+{
+    Files dicom, others;
+    std::set<std::string> endings = {".dcm"};
+    for (const std::filesystem::path& file : files) {
+        const bool ours = isDicom(file);
+        (ours ? dicom : others).push_back(file);
+        endings.insert(ours ? lowerCase(file.extension().string()) : ".dcm");
+    }
+    for (const std::filesystem::path& file : others) {
+        const std::string ending = lowerCase(file.extension().string());
+        std::error_code error;
+        const bool empty = std::filesystem::file_size(file, error) == 0;
+        refuseIf(ending == ".dcm" || (empty && !dicom.empty() && endings.contains(ending)), file,
+                 "{}: get it again, or take it out of the folder",
+                 empty ? "is empty, where a DICOM file belongs" : "does not begin as DICOM does, so it is damaged");
+    }
+    return dicom;
+}
+
 }  // namespace
 
 bool isDicom(const std::filesystem::path& file)
@@ -120,10 +143,26 @@ bool isDicom(const std::filesystem::path& file)
     return in.gcount() >= 16 && group;
 }
 
+Files filesOfFolder(const std::filesystem::path& folder)
+{
+    Files files;
+    for (const std::filesystem::path& file : filesIn(folder)) {
+        if (hasSourceName(file) || isDicom(file)) {
+            files.push_back(file);
+        }
+        try {
+            const Source source = hasSourceName(file) ? readSource(file) : Source();
+            files.insert(files.end(), {source.header, source.data});
+        } catch (const std::runtime_error&) {
+            continue;  // the import says so, where it reads it at all
+        }
+    }
+    return files;
+}
+
 Files dicomFilesIn(const std::filesystem::path& folder)
 {
-    Files files = filesIn(folder);
-    std::erase_if(files, [](const std::filesystem::path& f) { return !isDicom(f); });
+    const Files files = dicomAmong(filesIn(folder));
     refuseIf(files.empty(), folder, "holds no DICOM files: name a folder with one series, or a file");
     return files;
 }
@@ -131,7 +170,7 @@ Files dicomFilesIn(const std::filesystem::path& folder)
 ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOptions& options)
 {
     const Files all = filesIn(folder);
-    Files volumes, dicom;
+    Files volumes, others;
     for (const std::filesystem::path& file : all) {
         if (hasSourceName(file)) {
             // The two files of a pair are one volume.
@@ -139,10 +178,11 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
             if (ending != ".img" && lowerCase(file.stem().extension().string()) != ".img") {
                 volumes.push_back(file);
             }
-        } else if (isDicom(file)) {
-            dicom.push_back(file);
+        } else {
+            others.push_back(file);
         }
     }
+    const Files dicom = dicomAmong(others);
     refuseIf(!volumes.empty() && !dicom.empty(), folder,
              "holds {} volume files and {} DICOM files: name one of the files, or a folder with one kind", volumes.size(),
              dicom.size());
@@ -156,7 +196,9 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
              "holds {} files, but no DICOM and no masks (NIfTI, NRRD, MetaImage): name a file, or the "
              "folder that holds them itself",
              all.size());
-    refuseThreshold(folder, options);
+    refuseIf(!options.series.empty(), folder,
+             "--series {}: it holds no DICOM: leave --series out; --image-series is for the image", options.series);
+    refuseSegmentationOptions(folder, options);
     refuseIf(volumes.size() > 65535, folder, "holds more than 65535 masks: name a folder with fewer");
     return masks(folder, volumes, options);
 }

@@ -140,7 +140,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
     checkFile(path);
     if (isVdb(path)) {
         refuseVolume(path, options);
-        refuseThreshold(path, options);
+        refuseSegmentationOptions(path, options);
         return labelsApart(path, "OpenVDB", options, [&](const ImportOptions& o) { return vdbLabels(path, o); });
     }
     if (isDicom(path)) {
@@ -149,7 +149,7 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
-    refuseThreshold(path, options);
+    refuseSegmentationOptions(path, options);
     ImportedLabels labels = labelsOf(checkedSource(path, options, options.sheared), options);
     if (options.dicomLabels) {
         labels.warnings.emplace_back("--dicom-labels decides nothing: it is no DICOM");
@@ -214,6 +214,13 @@ void refuseThreshold(const std::filesystem::path& file, const ImportOptions& opt
              options.fractionalThreshold.value_or(0.0F));
 }
 
+void refuseSegmentationOptions(const std::filesystem::path& file, const ImportOptions& options)
+{
+    refuseThreshold(file, options);
+    refuseIf(options.sliceSpacing > 0, file, "--slice-spacing {:g}: it is no DICOM SEG: leave --slice-spacing out",
+             1e3 * options.sliceSpacing);
+}
+
 void placeAxes(Source& source, const ImportOptions& options)
 {
     if (source.oriented) {
@@ -251,6 +258,19 @@ Source readSource(const std::filesystem::path& file)
              "is no format that is read: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), "
              "FreeSurfer (.mgz), DICOM or OpenVDB (.vdb)");
     return reader(file);
+}
+
+std::vector<std::filesystem::path> filesOf(const std::filesystem::path& path)
+{
+    std::error_code error;
+    if (std::filesystem::is_directory(path, error)) {
+        return filesOfFolder(path);
+    }
+    if (readerFor(path) == nullptr) {
+        return {path};
+    }
+    const Source source = readSource(path);
+    return {path, source.header, source.data};
 }
 
 std::int64_t ImportedLabels::originalOf(std::uint16_t value) const noexcept

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t maxDifferent = 1024;  // more different values than this is an image
 constexpr double maxLabel = 65535;
 constexpr double roundable = 1e-3;             // how far from a whole number --round reaches
-constexpr double maxExact = 9007199254740992;  // 2^53: over it a double does not tell whole numbers apart
+constexpr double maxExact = 9007199254740992;  // 2^53: from it on a double may be another whole number
 constexpr std::size_t maxNamed = 5;            // labels in a warning
 
 double allowed(const LabelRules& rules, double value)
@@ -103,7 +103,7 @@ void LabelSink::addWhole(double whole)
 {
     const bool fits = whole >= 0 && whole <= maxLabel;
     if (rules_.renumber) {
-        const bool exact = std::abs(whole) <= maxExact;
+        const bool exact = std::abs(whole) < maxExact;
         if (!exact) {
             outside_ = outside_ ? outside_ : std::optional(Odd{here(), whole});
         }
@@ -154,8 +154,8 @@ void LabelSink::refuseOdd(bool surelyLabels) const
              "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
              "an image: give the segmentation that was made of it",
              outside_->voxel, outside_->value);
-    refuseIf(std::abs(outside_->value) > maxExact, file_,
-             "{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones", outside_->voxel,
+    refuseIf(std::abs(outside_->value) >= maxExact, file_,
+             "{} is {:.17g}: whole numbers from 2^53 on cannot be told apart, save it with smaller ones", outside_->voxel,
              outside_->value);
     refuse(file_,
            "{} is {:.17g}: a label is a whole number from 0 to 65535; if this is a label map, --renumber "

@@ -22,7 +22,10 @@ Fields readFields(const std::filesystem::path& file, std::uint64_t& end)
         if (equals == std::string::npos || line.size() > 10000) {
             break;
         }
-        fields[trimmed(line.substr(0, equals))] = trimmed(line.substr(equals + 1));
+        const std::string key = trimmed(line.substr(0, equals));
+        const std::string value = trimmed(line.substr(equals + 1));
+        refuseIf(fields.emplace(key, value).first->second != value, file,
+                 "its header gives '{}' twice, and says something else each time: save it again", key.substr(0, 60));
     }
     refuseIf(fields.count("ElementDataFile") == 0 || fields.count("DimSize") == 0 || fields.count("ElementType") == 0, file,
              "is not a MetaImage, DimSize, ElementType or ElementDataFile is missing from its header: save it again");
@@ -115,6 +118,16 @@ void place(const Fields& fields, std::size_t dimensions, Source& source)
     }
 }
 
+void readScale(const Fields& fields, Source& source)
+{
+    const char* const slopeKey = "ElementToIntensityFunctionSlope";
+    const char* const offsetKey = "ElementToIntensityFunctionOffset";
+    source.slope = someNumbers(source.header, fields, slopeKey, {slopeKey}, {1.0})[0];
+    source.intercept = someNumbers(source.header, fields, offsetKey, {offsetKey}, {0.0})[0];
+    refuseIf(source.slope == 0.0, source.header, "{} = 0: all its values would be one, save it again", slopeKey);
+    source.scaled = source.slope != 1.0 || source.intercept != 0.0;
+}
+
 void locateData(const Fields& fields, std::uint64_t headerEnd, Source& source)
 {
     const std::string& name = fields.at("ElementDataFile");
@@ -168,6 +181,7 @@ Source readMeta(const std::filesystem::path& file)
     refuseIf(!channels.empty() && channels != "1", file, "has {} values per voxel: save it with one",
              channels.substr(0, 30));
     place(fields, dimensions, source);
+    readScale(fields, source);
     if (fields.count("BinaryData") != 0 && !isTrue(fields, "BinaryData")) {
         locateData(fields, headerEnd, source);
         source.encoding = Encoding::text;

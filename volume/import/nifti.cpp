@@ -277,6 +277,29 @@ void locateData(const NiftiHeader& header, Source& source)
     source.encoding = exact ? Encoding::raw : looksLike(source.data, 0);
 }
 
+// What an element holds from `at` on, text and CDATA sections, and in `at` where its end tag is; nothing where it has none.
+std::string contentOf(const std::string& text, std::size_t& at, const std::string& end)
+{
+    constexpr std::size_t longest = 2000;
+    const std::string open = "<![CDATA[", close = "]]>";
+    const std::size_t most = at + longest;
+    std::string out;
+    while (at < most) {
+        const bool section = text.compare(at, open.size(), open) == 0;
+        const std::size_t from = section ? at + open.size() : at;
+        const std::size_t to = section ? text.find(close, from) : std::min(text.find(open, from), text.find(end, from));
+        if (to == std::string::npos || to > most) {
+            break;
+        }
+        out += text.substr(from, to - from);
+        at = section ? to + close.size() : to;
+        if (text.compare(at, end.size(), end) == 0) {
+            return out;
+        }
+    }
+    return "";
+}
+
 // Label names of TotalSegmentator and Caret: <Label Key="5" ...><![CDATA[liver]]></Label> in a header extension.
 std::vector<SegmentName> extensionNames(const Source& source, std::size_t headerBytes)
 {
@@ -290,18 +313,15 @@ std::vector<SegmentName> extensionNames(const Source& source, std::size_t header
     // Looked for piece by piece: std::regex needs a frame of the stack for each character of a repetition.
     const std::regex key("Key=\"(\\d{1,5})\"");
     std::vector<SegmentName> names;
-    for (auto at = text.find("<Label "); at != std::string::npos; at = text.find("<Label ", at + 1)) {
+    for (auto at = text.find("<Label "); at != std::string::npos; at = text.find("<Label ", at)) {
         const auto open = text.find('>', at);
-        const auto close = text.find("</Label>", at);
+        if (open == std::string::npos) {
+            break;
+        }
+        const std::string attributes = text.substr(at, std::min<std::size_t>(open - at, 1000));
+        at = open + 1;
+        const std::string name = contentOf(text, at, "</Label>");
         std::smatch match;
-        if (open == std::string::npos || close == std::string::npos || open > close || close - at > 2000) {
-            continue;
-        }
-        const std::string attributes = text.substr(at, open - at);
-        std::string name = text.substr(open + 1, close - open - 1);
-        if (name.rfind("<![CDATA[", 0) == 0 && name.size() >= 12) {
-            name = name.substr(9, name.size() - 12);
-        }
         if (std::regex_search(attributes, match, key) && std::stoi(match[1]) <= 65535 && !name.empty()) {
             names.push_back({{static_cast<std::uint16_t>(std::stoi(match[1])), name, ""}, 0});
         }

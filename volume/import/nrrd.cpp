@@ -178,6 +178,9 @@ void findLayers(const NrrdHeader& header, const std::vector<Axis>& axes, const s
                  "sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
                  "save one volume of it",
                  header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
+        refuseIf(axes[i].kind.ends_with("-color") || axes[i].kind == "complex", header.file,
+                 "kinds: {}: has colours or complex numbers as voxels: save it with one number per voxel",
+                 header.field("kinds").substr(0, 80));
         source.dimensions =
             fmt::format("sizes: {}; kinds: {}", header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
         const bool list = isLayerKind(axes[i].kind) && axes[i].size <= 4096;
@@ -221,7 +224,7 @@ void placeNrrd(const NrrdHeader& header, Source& source)
 }
 
 // Segments as 3D Slicer names them in a .seg.nrrd.
-std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
+std::vector<SegmentName> slicerSegments(const NrrdHeader& header, std::uint64_t layers)
 {
     std::vector<SegmentName> segments;
     for (std::uint64_t i = 0; i < 65535; ++i) {
@@ -231,7 +234,7 @@ std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
         if (!name && !id) {
             break;
         }
-        // Before version 4.11 each segment was a layer of its own, of value 1.
+        // Before version 4.11 each segment was a layer of its own, of value 1. A file of one layer needs not name it.
         const auto whole = [&](const char* what, std::int64_t fallback) {
             const auto text = header.pair(key + what);
             const std::int64_t value = text ? integer(header.file, key + what, *text) : fallback;
@@ -241,7 +244,7 @@ std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
         };
         SegmentName segment;
         segment.label.value = static_cast<std::uint16_t>(whole("LabelValue", 1));
-        segment.layer = static_cast<std::uint64_t>(whole("Layer", static_cast<std::int64_t>(i)));
+        segment.layer = static_cast<std::uint64_t>(whole("Layer", layers > 1 ? static_cast<std::int64_t>(i) : 0));
         segment.label.name = name.value_or(id.value_or(""));
         if (const auto colour = header.pair(key + "Color")) {
             const std::vector<double> rgb = numbers(header.file, key + "Color", *colour);
@@ -261,6 +264,22 @@ std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
         segments.push_back(std::move(segment));
     }
     return segments;
+}
+
+// A layer and a value are one segment.
+void checkSegments(const Source& source)
+{
+    std::map<std::pair<std::uint64_t, std::uint16_t>, std::string> known;
+    for (const SegmentName& s : source.segments) {
+        refuseIf(s.layer >= source.layers, source.header,
+                 "segment '{}' is said to be in layer {}, but there {}: save it again", s.label.name, s.layer,
+                 source.layers == 1 ? "is one layer" : fmt::format("are {} layers", source.layers));
+        const auto [there, added] = known.emplace(std::pair(s.layer, s.label.value), s.label.name);
+        refuseIf(!added, source.header,
+                 "segments '{}' and '{}' both have value {} of layer {}, so one of them has no voxels of its own: save it "
+                 "again",
+                 there->second, s.label.name, s.label.value, s.layer);
+    }
 }
 
 // The two characters that the format escapes in the value of a key.
@@ -403,8 +422,9 @@ Source readNrrd(const std::filesystem::path& file)
     const NrrdHeader header = readNrrdHeader(file);
     Source source;
     source.header = file;
-    source.segments = slicerSegments(header);
     placeNrrd(header, source);
+    source.segments = slicerSegments(header, source.layers);
+    checkSegments(source);
     source.component = nrrdComponent(file, header.field("type"));
     locateData(header, source);
     judgePacking(source);

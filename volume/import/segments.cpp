@@ -139,9 +139,6 @@ std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& 
         segments.push_back({std::move(label), {}, 0});
     };
     for (const SegmentName& s : source.segments) {
-        refuseIf(s.layer >= source.layers, source.header,
-                 "segment '{}' is said to be in layer {}, but there are {} layers: save it again", s.label.name, s.layer,
-                 source.layers);
         append(s.label, s.layer, s.label.value);
     }
     constexpr std::size_t most = 4096;  // segments

@@ -124,6 +124,8 @@ void refuseAxes(const std::filesystem::path& file, const ImportOptions& options)
 void refuseVolume(const std::filesystem::path& file, const ImportOptions& options);
 /// Refuses options.fractionalThreshold for labels without probabilities.
 void refuseThreshold(const std::filesystem::path& file, const ImportOptions& options);
+/// Refuses all that only a DICOM SEG takes.
+void refuseSegmentationOptions(const std::filesystem::path& file, const ImportOptions& options);
 
 /// How far two placements of the same voxels are apart at most, in voxels of `a`.
 double voxelsApart(const Affine& a, const Affine& b, Index3 size);

@@ -3,6 +3,7 @@
 #include <base/build.h>
 #include <base/error.h>
 #include <base/fnv.h>
+#include <base/outputs.h>
 #include <base/quantities.h>
 #include <datasets/label_map.h>
 #include <volume/image_check.h>
@@ -25,11 +26,42 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool isFolder(const fs::path& path)
+{
+    std::error_code none;
+    return fs::is_directory(path, none);
+}
+
+// The series of the image: --series is for labels that are a folder.
+std::string seriesOfImage(const ImportRequest& o)
+{
+    return o.imageSeries.empty() && !isFolder(o.input) ? o.reading.series : o.imageSeries;
+}
+
+// The same coordinates in two frames of reference are two places of the patient.
+void checkFrame(const ImportRequest& o, const volume::ImportedLabels& labels, const volume::ImportedImage& image,
+                std::vector<std::string>& notes)
+{
+    const bool differ = !labels.frame.empty() && !image.frame.empty() && labels.frame != image.frame;
+    base::failIf(differ && !o.ignoreFrame,
+                 "{}: its frame of reference ({}) is not that of {} ({}), so it lies elsewhere: give the image that the "
+                 "segmentation was made of, or --ignore-frame-of-reference if both are registered to each other",
+                 o.image.native(), image.frame, o.input.filename().string(), labels.frame);
+    if (o.ignoreFrame) {
+        notes.push_back(differ ? fmt::format("labels and image have different frames of reference ({} and {}), which "
+                                             "--ignore-frame-of-reference takes for one",
+                                             labels.frame, image.frame)
+                               : "--ignore-frame-of-reference decides nothing: no two frames of reference differ");
+    }
+}
+
 // The image as its file has it, its unit as --image-unit has it.
-volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>& notes, const ImportProgress& tell)
+volume::ImportedImage readImage(const ImportRequest& o, const volume::ImportedLabels& labels,
+                                std::vector<std::string>& notes, const ImportProgress& tell)
 {
     volume::ImportOptions reading;
-    reading.series = o.reading.series;
+    reading.series = seriesOfImage(o);
+    reading.seriesOfLabels = labels.madeOf;
     reading.volume = o.imageVolume;
     reading.axes = o.imageAxes.empty() ? o.reading.axes : o.imageAxes;
     reading.axesIfUnsaid = o.imageAxes.empty();
@@ -39,6 +71,7 @@ volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>
     for (const std::string& warning : image.warnings) {
         notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
     }
+    checkFrame(o, labels, image, notes);
     base::failIf(!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit,
                  "{}: says itself that it is in {}: leave --image-unit out", o.image.native(), image.what);
     image.what = o.imageUnit.empty() ? image.what : o.imageUnit;
@@ -188,6 +221,7 @@ void checkBody(const ImportRequest& request, const volume::LabelImage& image)
 void checkRequest(const ImportRequest& o)
 {
     checkLength(voxelBounds, o.steps.voxel);
+    checkLength(sliceBounds, o.reading.sliceSpacing);
     checkLength(skinBounds, o.steps.addSkin);
     checkLength(hullBounds, o.hull);
     checkLength(padBounds, o.steps.pad);
@@ -198,10 +232,33 @@ void checkRequest(const ImportRequest& o)
     base::failIf(!o.imageUnit.empty() && o.image.empty(), "--image-unit: needs the image: add --image FILE");
     base::failIf(o.imageVolume > 0 && o.image.empty(), "--image-volume: needs the image: add --image FILE");
     base::failIf(!o.imageAxes.empty() && o.image.empty(), "--image-axes: needs the image: add --image FILE");
+    base::failIf(!o.imageSeries.empty() && o.image.empty(), "--image-series: needs the image: add --image FILE");
+    base::failIf(o.ignoreFrame && o.image.empty(), "--ignore-frame-of-reference: needs the image: add --image FILE");
     std::error_code none;
-    base::failIf(!o.reading.series.empty() && fs::exists(o.input, none) && !fs::is_directory(o.input, none) &&
-                     !fs::is_directory(o.image, none),
+    base::failIf(!o.imageSeries.empty() && fs::exists(o.image, none) && !isFolder(o.image),
+                 "--image-series: the image is no folder of DICOM: leave --image-series out");
+    base::failIf(!o.reading.series.empty() && fs::exists(o.input, none) && !isFolder(o.input) && !isFolder(o.image),
                  "--series: neither the labels nor the image are a folder of DICOM: leave --series out");
+    base::failIf(!o.reading.series.empty() && !o.imageSeries.empty() && !isFolder(o.input),
+                 "--series: the labels are one file: leave --series out");
+}
+
+void checkReplaced(const ImportRequest& o, const std::vector<fs::path>& outputs)
+{
+    std::error_code none;
+    if (std::ranges::none_of(outputs, [&](const fs::path& file) { return fs::is_regular_file(file, none); })) {
+        return;
+    }
+    std::vector<fs::path> files = volume::filesOf(o.input);
+    if (!o.image.empty()) {
+        const std::vector<fs::path> more = volume::filesOf(o.image);
+        files.insert(files.end(), more.begin(), more.end());
+    }
+    std::vector<std::string> notes;
+    if (const auto found = o.mapping.names.empty() ? datasetOf(o.input, notes) : std::nullopt) {
+        files.push_back(*found);
+    }
+    base::checkOutputs(outputs, files);
 }
 
 NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
@@ -224,7 +281,7 @@ ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTa
     std::vector<std::string> notes = labels.warnings;
     noteOverlaps(labels, request.mapping.verbose, notes);
     std::vector<volume::LabelName> named = mapLabels(request.mapping, request.input, labels, counts, table, notes);
-    auto image = request.image.empty() ? std::nullopt : std::optional(readImage(request, notes, tell));
+    auto image = request.image.empty() ? std::nullopt : std::optional(readImage(request, labels, notes, tell));
     std::vector<PreparationStep> steps;
     const auto done = [&](std::vector<PreparationStep> more) {
         steps.insert(steps.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));

@@ -20,6 +20,8 @@ struct ImportRequest {
     std::string stiffness;          // stiffness map, see datasets::stiffnessMap(); empty: the image changes nothing
     std::string imageUnit;          // "HU", where the image's file does not say so
     int imageVolume = 0;            // of an image with four dimensions, from 1
+    std::string imageSeries;        // of an image that is a folder; empty: reading.series where the labels are one file
+    bool ignoreFrame = false;       // labels and image of two DICOM frames of reference are in one all the same
     std::string imageAxes;          // where the image's axes go, if its file does not say it; empty: as reading.axes
     volume::ImportOptions reading;  // of the labels
     MappingOptions mapping;         // of labels to tissues
@@ -33,13 +35,17 @@ struct LengthBounds {
     const char* option;
     double least, most;
 };
-inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, skinBounds{"--add-skin", 0.05e-3, 50e-3},
-    hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5}, cropBounds{"--crop-margin", 0, 1},
-    holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
+inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, sliceBounds{"--slice-spacing", 0.05e-3, 50e-3},
+    skinBounds{"--add-skin", 0.05e-3, 50e-3}, hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5},
+    cropBounds{"--crop-margin", 0, 1}, holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
 
 /// Throws std::runtime_error for a request that contradicts itself, or has a length out of its bounds, by the options of
 /// `palpate import`.
 void checkRequest(const ImportRequest& request);
+
+/// Refuses an output that is there and is one of the files that the import reads: those that the request names, their data
+/// beside a header, what a folder of it holds, and the dataset.json that is found. Throws std::runtime_error.
+void checkReplaced(const ImportRequest& request, const std::vector<std::filesystem::path>& outputs);
 
 /// Told what is going on, and the fraction of it that is done where that is known.
 using ImportProgress = std::function<void(const std::string& what, std::optional<double> fraction)>;
