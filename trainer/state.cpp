@@ -280,6 +280,14 @@ void noteKept(State& state)
     noteTyped(state);
 }
 
+void casesListed(State& state, std::vector<CaseEntry> cases)
+{
+    const std::string id = state.cases.empty() ? "" : chosenCase(state).id;
+    state.cases = std::move(cases);
+    const auto at = std::ranges::find(state.cases, id, &CaseEntry::id);
+    state.chosen = at != state.cases.end() ? static_cast<std::size_t>(at - state.cases.begin()) : 0;
+}
+
 void peopleListed(State& state, std::vector<PersonEntry> people)
 {
     state.people = std::move(people);
