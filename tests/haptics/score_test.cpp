@@ -68,44 +68,6 @@ TEST(Score, MarginIsTheLeastDistanceToAVitalStructureInside)
     EXPECT_TRUE(std::isinf(scoreTicks(along({{0, -0.03}, {1, -0.01}})).vitalMargin));
 }
 
-// A needle of 1 mm whose axis passes an artery at 0.8 mm touches it with its surface, 0.2 mm deep: the touch, its time, its
-// depth and the margin say the same. In the air only the tip touches.
-TEST(Score, TouchTimeDepthAndMarginAreThoseOfTheNeedlesSurface)
-{
-    SessionInfo info = synthetic::info();
-    info.extra.emplace_back(toolRadiusKey, "1");
-    EXPECT_DOUBLE_EQ(toolRadiusOf(info), 1 * millimetre);
-    Scorer scorer(info);
-    auto ticks = along({{0, -0.03}, {1, 0}, {2, 0.04}});
-    ticks[500].distance[1] = 0.5 * millimetre;
-    for (std::size_t n = 1500; n < 1700; ++n) {
-        ticks[n].distance[1] = 0.8 * millimetre;
-    }
-    synthetic::addEvent(ticks[1500], synthetic::event(EventKind::vitalTouch, 1, 0, 0.2 * millimetre));
-    for (const TickRecord& tick : ticks) {
-        scorer.add(tick);
-    }
-    const Score s = scorer.score();
-    EXPECT_EQ(s.vitalContacts, 1U);
-    EXPECT_DOUBLE_EQ(s.vitalSeconds, 0.2);
-    EXPECT_NEAR(s.vitalDepth, 0.2 * millimetre, 1e-12);
-    EXPECT_NEAR(s.vitalMargin, -0.2 * millimetre, 1e-12);
-}
-
-// The throw leaves the tip where it is: what it reaches is in its event alone.
-TEST(Score, AThrowIntoAVesselLeavesNoMargin)
-{
-    auto ticks = along({{0, -0.03}, {1, 0}, {2, 0.04}});
-    for (TickRecord& tick : ticks) {
-        tick.distance[1] = 5 * millimetre;
-    }
-    synthetic::addEvent(ticks[1500], synthetic::event(EventKind::vitalTouch, 1, 0, 1.3 * millimetre));
-    const Score s = scoreTicks(ticks);
-    EXPECT_DOUBLE_EQ(s.vitalDepth, 1.3 * millimetre);
-    EXPECT_DOUBLE_EQ(s.vitalMargin, -1.3 * millimetre);
-    EXPECT_EQ(s.vitalSeconds, 0.0);
-}
-
 // The third difference of block means of x = c t^3 / 6 is c exactly. At rest and at constant speed there is none.
 TEST(Score, JerkOfACubicIsItsThirdDerivative)
 {

@@ -2,7 +2,6 @@
 
 #include <tests/allocations.h>
 
-#include <haptics/broadcast.h>
 #include <haptics/contact_law.h>
 #include <haptics/hand.h>
 #include <haptics/replay.h>
@@ -17,7 +16,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <span>
 #include <vector>
 
 namespace palpate::haptics {
@@ -318,52 +316,6 @@ TEST(Simulation, FastStabCannotTunnelThroughTheSkin)
     ASSERT_GE(kinds.size(), 2U);
     EXPECT_EQ(kinds[0], EventKind::contact);
     EXPECT_EQ(kinds[1], EventKind::puncture);
-}
-
-// In the air and on the skin the gun takes no core: one event a press, and viewers know when.
-TEST(Simulation, TheGunIsRefusedOutsideTheBody)
-{
-    const auto& model = tests::layeredNeedle();
-    Simulation simulation(model);
-    channel::State shown;
-    int refusals = 0;
-    const auto press = [&](double tip) {
-        auto sample = at({0, tip, 0});
-        for (const std::uint32_t button : {0U, buttonFire, buttonFire}) {
-            sample.buttons = buttonDeadMan | button;
-            const TickRecord& r = simulation.tick(sample);
-            EXPECT_FALSE(r.fired);
-            showTick(r, {}, shown);
-            const auto events = std::span(r.events).first(r.eventCount);
-            refusals += static_cast<int>(std::ranges::count(events, EventKind::fireRefused, &Event::kind));
-        }
-    };
-    settle(simulation, -10e-3);
-    EXPECT_LT(shown.refused, 0);
-    press(-10e-3);
-    EXPECT_EQ(refusals, 1);
-    EXPECT_NEAR(shown.refused, shown.time, 2 * tickSeconds);
-    stroke(simulation, -10e-3, 0.1e-3, 0.02, [](const TickRecord&) {});
-    press(0.1e-3);
-    EXPECT_EQ(simulation.record().phase, Phase::contact);
-    EXPECT_EQ(refusals, 2);
-    EXPECT_EQ(shown.cores, 0U);
-}
-
-// The best core stays the best, whatever comes after it.
-TEST(Simulation, ViewersKnowTheBestCoreAndTheLast)
-{
-    channel::State shown;
-    TickRecord r;
-    r.fired = true;
-    for (const double fraction : {0.0, 0.57, 0.2}) {
-        r.core.targetFraction = fraction;
-        showTick(r, {}, shown);
-    }
-    EXPECT_EQ(shown.cores, 3U);
-    EXPECT_EQ(shown.coreTarget, 0.2);
-    EXPECT_EQ(shown.bestCore, 2U);
-    EXPECT_EQ(shown.bestTarget, 0.57);
 }
 
 // The core is looked up where the notch is: fired inside the tumour it is tumour, beside it there is none.

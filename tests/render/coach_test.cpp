@@ -78,8 +78,8 @@ TEST(Coach, LeadsThroughABiopsyStepByStep)
     CoachView onPicture = view;
     onPicture.scanned = true;  // where the other button moves the probe
     EXPECT_EQ(coach(scenery, s, onPicture).now, "Fire the gun (Space)");
-    s.cores = 1;
-    s.coreTarget = 0.6;
+    s.cores = s.bestCore = 1;
+    s.coreTarget = s.bestTarget = 0.6;
     EXPECT_NE(coach(scenery, s, view).now.find("60 % tumour: draw the needle out"), std::string::npos);
     s.phase = channel::Phase::free;
     EXPECT_NE(coach(scenery, s, view).now.find("end the session (E, or click here)"), std::string::npos);
