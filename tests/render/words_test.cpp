@@ -98,11 +98,13 @@ TEST_F(WordsTest, TheListOfKeysLeavesTheStepInSight)
 {
     Picture& picture = studio->picture();
     picture.setHelp({{"?", "shows the keys"}, {"L", "changes the layout"}});
+    picture.setSteps(true, true);
     studio->resize(1280, 960);
     studio->take(0.05, Layout::trainee, true);
     const auto listed = picture.written();
     EXPECT_TRUE(std::ranges::any_of(listed, [](const Written& w) { return w.words.starts_with("1/5  "); }));
     picture.setHelp({});
+    picture.setSteps(false, false);
     studio->resize(width, height);
 }
 
