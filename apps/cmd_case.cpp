@@ -100,6 +100,10 @@ void check(const CaseArguments& o)
     for (const std::string& fault : faults) {
         fmt::print("{}\n", fault);
     }
+    if (c.picture.empty()) {
+        fmt::print("{}: a hint: there is no picture; palpate case picture {} makes one\n",
+                   (c.folder / training::caseFile).string(), base::shellWord(o.id));
+    }
     base::failIf(!faults.empty(), "{}: {} {}", o.id, faults.size(), faults.size() == 1 ? "fault" : "faults");
     fmt::print("{}: good\n", c.id);
 }

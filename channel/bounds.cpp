@@ -137,8 +137,9 @@ bool sound(const State& s, const Scenery& scenery) noexcept
         sound(s.probe) && s.holes <= maxHoles && std::ranges::all_of(s.hole, [](const Hole& h) { return sound(h); });
     const bool marks = std::ranges::all_of(s.mark, [](const Mark& m) { return sound(m); });
     return places && forces && rows && probe && marks && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
-           upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && number(s.aheadTissueDistance) &&
-           std::ranges::all_of(s.distance, number) && std::ranges::all_of(s.ahead, number);
+           upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && upTo(s.bestTarget, furthest) &&
+           upTo(s.refused, largestValue) && number(s.aheadTissueDistance) && std::ranges::all_of(s.distance, number) &&
+           std::ranges::all_of(s.ahead, number);
 }
 
 bool sound(const Input& input) noexcept

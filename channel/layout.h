@@ -19,7 +19,7 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 8;
+inline constexpr std::uint32_t version = 9;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
@@ -153,9 +153,11 @@ struct State {
     Phase phase = Phase::free;
     Status status = Status::running;
     Warning warning = Warning::none;
-    std::uint32_t warned = 0;                      // index of the structure that the warning is about
-    std::uint32_t tissue = 0;                      // row of the tissue table at the tip
-    std::uint32_t cores = 0;                       // samples taken
+    std::uint32_t warned = 0;    // index of the structure that the warning is about
+    std::uint32_t tissue = 0;    // row of the tissue table at the tip
+    std::uint32_t cores = 0;     // samples taken
+    std::uint32_t bestCore = 0;  // the one with the largest share of target, from 1; 0: none
+    std::uint32_t padding = 0;
     double inserted = 0;                           // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
     // From the tip to where the needle's line touches it; infinite: not within lookAheadReach, nor within the throw [m].
@@ -167,6 +169,8 @@ struct State {
     std::uint16_t reached = 0;       // 1: the tip has been in the target
     double coreTarget = 0;           // fraction of target tissue in the last core
     double coreLength = 0;           // length in the target of the last core [m]
+    double bestTarget = 0;           // fraction of target tissue in bestCore
+    double refused = -1;             // when the gun did not fire because the needle was not inside [s]; below 0: never
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
     Standing standing = Standing::no;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
 
 namespace palpate::haptics {
 
@@ -93,6 +94,14 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
         state.holes = std::min<std::uint32_t>(state.cores, channel::maxHoles);
         state.coreTarget = r.core.targetFraction;
         state.coreLength = r.core.targetLength;
+        if (state.cores == 1 || state.coreTarget > state.bestTarget) {
+            state.bestCore = state.cores;
+            state.bestTarget = state.coreTarget;
+        }
+    }
+    const auto events = std::span(r.events).first(std::min<std::size_t>(r.eventCount, maxEventsPerTick));
+    if (std::ranges::find(events, EventKind::fireRefused, &Event::kind) != events.end()) {
+        state.refused = state.time;
     }
     state.missed = timing.missed;
     if (r.tick % p99Period == p99Period - 1) {

@@ -92,6 +92,7 @@ void LossWatch::add(const TickRecord& record) noexcept
             at_[touch] = seconds;
             touched_ = event.structure;
         }
+        note(refusal, event.kind == EventKind::fireRefused, seconds);
     }
     note(mark, now.marks > before_.marks, seconds);
     before_ = now;
@@ -160,7 +161,10 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
 {
     const std::string target = info.structures.empty() ? tr("target") : base::spokenHere(info.structures[0]);
     if (s.passes == 0) {
-        return {{"passes", 75, tr("The gun was not fired: there is no core"), std::nullopt}};
+        return {{"passes", 75,
+                 at(refusal) ? tr("The gun was fired only outside the body: there is no core")
+                             : tr("The gun was not fired: there is no core"),
+                 at(refusal)}};
     }
     const ScoreShares fraction = sharesOf(s);
     const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * fraction.hit * fraction.stays;

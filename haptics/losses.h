@@ -47,6 +47,7 @@ private:
         mark,
         blind,
         pierced,
+        refusal,
         moments
     };
 

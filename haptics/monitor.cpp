@@ -70,7 +70,7 @@ std::array<Proximity, maxStructures> monitor(const SessionModel& model, const oc
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept
 {
     std::array<Proximity, maxStructures> found{};
-    const double radius = model.scene.tool.radius;
+    const double reach = touchReach(tip.phase, model.scene.tool.radius);
     for (std::size_t i = 0; i < model.structures.size(); ++i) {
         const auto& s = model.structures[i];
         found[i] = proximityOf(s, body, tip, position);
@@ -86,8 +86,7 @@ std::array<Proximity, maxStructures> monitor(const SessionModel& model, const oc
         }
         warn(EventKind::warning, index, d, s.warnDistance, d, state.near[i], record);
         warn(EventKind::veryNear, index, d, veryNearShare * s.warnDistance, d, state.veryNear[i], record);
-        warn(EventKind::vitalTouch, index, d, tip.phase != Phase::free ? radius : 0.0, radius - d, state.touching[i],
-             record);
+        warn(EventKind::vitalTouch, index, d, reach, reach - d, state.touching[i], record);
         found[i].touching = state.touching[i];
         const auto level = levelOf(state, i);
         const bool nearer = level == record.warning && record.warned != 0xFF && d < record.distance[record.warned];

@@ -129,6 +129,7 @@ SessionInfo infoOf(const SessionModel& model)
     info.volumeHash = modelHash(model);
     info.model = name(model.scene.model.level);
     info.extra.emplace_back(targetShapeKey, toText(shapeOfTarget(model)));
+    info.extra.emplace_back(toolRadiusKey, fmt::format("{:.12g}", 1e3 * model.scene.tool.radius));
     if (model.scene.ct.given()) {
         info.extra.emplace_back(scanDoseKey, fmt::format("{:.12g}", model.scene.ct.doseLength()));
     }
@@ -155,8 +156,9 @@ std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
         std::string recorded, own;
     };
     const std::string shape = extra(info, targetShapeKey), ownShape = extra(own, targetShapeKey);
+    const std::string radius = extra(info, toolRadiusKey), ownRadius = extra(own, toolRadiusKey);
     const std::string dose = extra(info, scanDoseKey), ownDose = extra(own, scanDoseKey);
-    const std::array<Said, 7> all{
+    const std::array<Said, 8> all{
         {{"scene", info.scene == own.scene, info.scene, own.scene},
          {"model", info.model == own.model, info.model, own.model},
          {"the list of structures", info.structures == own.structures, list(info.structures), list(own.structures)},
@@ -164,6 +166,7 @@ std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
          {"the list of warning distances [m]", info.warnDistances == own.warnDistances, list(info.warnDistances),
           list(own.warnDistances)},
          {"the target's shape", shape.empty() || shape == ownShape, shape, ownShape},
+         {"the tool's radius [mm]", radius.empty() || radius == ownRadius, radius, ownRadius},
          {"the dose of a CT scan [mGy cm]", dose == ownDose, dose, ownDose}}};
     const auto other = std::ranges::find(all, false, &Said::same);
     return other == all.end()

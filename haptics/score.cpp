@@ -1,5 +1,7 @@
 #include <haptics/score.h>
 
+#include <haptics/monitor.h>
+
 #include <fmt/format.h>
 
 #include <glm/geometric.hpp>
@@ -31,6 +33,17 @@ double ramp(double value, double full, double none) noexcept
 double corePoints(double fraction, double length, double error) noexcept
 {
     return 30 * std::min(1.0, fraction / 0.5) + 10 * std::min(1.0, length / 10e-3) + 10 * ramp(error, 0, 10e-3);
+}
+
+// 0 where there is none, or none that can be.
+double extraNumber(const SessionInfo& info, const char* key)
+{
+    const auto found = std::ranges::find(info.extra, key, &std::pair<std::string, std::string>::first);
+    double number = 0;
+    if (found != info.extra.end()) {
+        std::from_chars(found->second.data(), found->second.data() + found->second.size(), number);
+    }
+    return std::isfinite(number) ? std::max(number, 0.0) : 0.0;
 }
 
 // However well it was done: who missed has no technique to be praised for.
@@ -88,14 +101,14 @@ std::optional<TargetShape> targetShapeOf(const SessionInfo& info)
     return std::nullopt;
 }
 
+double toolRadiusOf(const SessionInfo& info)
+{
+    return 1e-3 * extraNumber(info, toolRadiusKey);
+}
+
 double scanDoseOf(const SessionInfo& info)
 {
-    const auto found = std::ranges::find(info.extra, scanDoseKey, &std::pair<std::string, std::string>::first);
-    double dose = 0;
-    if (found != info.extra.end()) {
-        std::from_chars(found->second.data(), found->second.data() + found->second.size(), dose);
-    }
-    return std::isfinite(dose) ? std::max(dose, 0.0) : 0.0;
+    return extraNumber(info, scanDoseKey);
 }
 
 // Weights: the list of measures is of Johnson 2012 and of published simulators; the points and the limits are ours, and
@@ -219,6 +232,7 @@ void PathMeter::pause(Vec3 tip) noexcept
 
 Scorer::Scorer(const SessionInfo& info)
     : rate_(info.rate),
+      toolRadius_(toolRadiusOf(info)),
       structures_(std::min<std::size_t>(info.structures.size(), maxStructures)),
       target_(targetShapeOf(info))
 {
@@ -359,14 +373,17 @@ void Scorer::addVital(const TickRecord& record) noexcept
         if (event.kind == EventKind::vitalTouch) {
             ++score_.vitalContacts;
             score_.vitalDepth = std::max(score_.vitalDepth, event.value);
+            score_.vitalMargin = std::min(score_.vitalMargin, -event.value);
         }
     }
     bool inside = false;
+    const double reach = touchReach(record.phase, toolRadius_);
     for (std::size_t i = 1; i < structures_; ++i) {
-        inside = inside || record.distance[i] <= 0;
-        score_.vitalDepth = std::max(score_.vitalDepth, -record.distance[i]);
+        const double clear = record.distance[i] - reach;
+        inside = inside || clear < 0;
+        score_.vitalDepth = std::max(score_.vitalDepth, -clear);
         if (record.phase == Phase::inserted) {
-            score_.vitalMargin = std::min(score_.vitalMargin, record.distance[i]);
+            score_.vitalMargin = std::min(score_.vitalMargin, clear);
         }
     }
     vitalTicks_ += inside ? 1 : 0;

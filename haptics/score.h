@@ -43,10 +43,10 @@ struct Score {
     double bestTargetFraction = 0;  // of the core of that firing
     double bestTargetLength = 0;    // [m]
     std::uint32_t vitalContacts = 0;
-    double vitalSeconds = 0;  // time with the tip in contact with a vital structure
-    double vitalDepth = 0;    // deepest [m]
-    /// From the tip to the nearest vital structure while inside, below 0 in it [m]; infinite when never inside or without
-    /// one.
+    double vitalSeconds = 0;  // time with the tool's surface in a vital structure
+    double vitalDepth = 0;    // of the surface in it, deepest [m]
+    /// From the tool's surface to the nearest vital structure while inside and in the gun's throws, below 0 in it [m];
+    /// infinite when never inside or without one.
     double vitalMargin = std::numeric_limits<double>::infinity();
     std::uint32_t warnings = 0;
     double jerk = 0;        // root mean square of the tip's, below 20 Hz, while in contact [m/s^3]
@@ -142,6 +142,11 @@ std::string toText(const TargetShape& shape);
 /// What the record of a session says; nothing where it does not.
 std::optional<TargetShape> targetShapeOf(const SessionInfo& info);
 
+/// Key of SessionInfo::extra: radius of the tool [mm].
+inline constexpr const char* toolRadiusKey = "tool_radius_mm";
+/// What the record of a session says [m]; 0 where it says nothing: distances then count from the tip.
+double toolRadiusOf(const SessionInfo& info);
+
 /// Key of SessionInfo::extra: dose-length product of one CT scan [mGy cm], of a scene with [ct].
 inline constexpr const char* scanDoseKey = "ct_scan_mgy_cm";
 /// What the record of a session says of it; 0 where it says nothing.
@@ -171,7 +176,8 @@ private:
     void judgeProbe(Score& score) const noexcept;
     void addScan(const TickRecord& record) noexcept;
 
-    double rate_ = 1000;  // [Hz]
+    double rate_ = 1000;     // [Hz]
+    double toolRadius_ = 0;  // [m]
     std::size_t structures_ = 0;
     Score score_;
     PathMeter path_, insidePath_;

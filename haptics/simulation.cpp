@@ -330,7 +330,13 @@ void Simulation::seeNeedle() noexcept
 // The gun fires once per press of its button, and only a needle that is inside takes a core.
 void Simulation::fire() noexcept
 {
-    if (!trigger_.with(record_.device) || tip_.phase != Phase::inserted) {
+    if (!trigger_.with(record_.device)) {
+        return;
+    }
+    if (tip_.phase != Phase::inserted) {
+        if (model_.scene.tool.kind == datasets::ToolKind::needle) {
+            addEvent(record_, {EventKind::fireRefused, 0xFF, 0, 0.0});
+        }
         return;
     }
     record_.fired = true;

@@ -16,11 +16,13 @@ namespace {
 using base::said;
 using base::tr;
 
-constexpr double atRim = 3e-3;     // from the target's surface: near enough to fire [m]
-constexpr double offLine = 3e-3;   // of tip from planned line that is told [m]
-constexpr double restFor = 3.0;    // on the skin, where no more is asked for [s]
-constexpr double restForce = 2.0;  // force of such a rest [N]
-constexpr double hit = 0.1;        // fraction of target in a core that is worth taking out
+constexpr double atRim = 3e-3;       // from the target's surface: near enough to fire [m]
+constexpr double offLine = 3e-3;     // of tip from planned line that is told [m]
+constexpr double restFor = 3.0;      // on the skin, where no more is asked for [s]
+constexpr double restForce = 2.0;    // force of such a rest [N]
+constexpr double hit = 0.1;          // fraction of target in a core that is worth taking out
+constexpr double offMiddle = 1e-3;   // of the needle's line from the target's middle that is told [m]
+constexpr double refusalSaid = 2.0;  // that the gun did not fire [s]
 
 const char* directionInWords(glm::dvec3 way)
 {
@@ -68,8 +70,10 @@ std::string wayFault(const channel::Scenery& scenery, const channel::State& stat
     if (along < 0)
         return said(tr("The tip is beyond the {}: draw back"), target(scenery));
     const glm::dvec3 across = way - along * axis;
-    // Beyond what is looked at along the line, the target counts as a ball.
-    if (glm::length(way) > channel::lookAheadReach && glm::length(across) < glm::length(way) - state.distance[0])
+    // Beyond what is looked at along the line, and where cores have taken what the line meets, the target counts as a ball.
+    const bool unseen = glm::length(way) > channel::lookAheadReach || state.cores > 0;
+    const double radius = unseen ? glm::length(way) - state.distance[0] : 0.0;
+    if (glm::length(across) < std::max(offMiddle, radius))
         return "";
     return said(tr("The needle passes the {}: its middle lies {:.0f} mm towards {}"), target(scenery),
                 millimetres(glm::length(across)), directionInWords(across));
@@ -123,18 +127,18 @@ Coaching approach(const channel::Scenery& scenery, const channel::State& state, 
         const std::string danger = throwFault(scenery, state);
         c.wrong = !danger.empty() ? danger : view.planned ? wayFault(scenery, state, view.aim) : "";
     }
-    if (state.cores > 0 && state.coreTarget < hit && c.wrong.empty())
+    if (state.cores > 0 && c.wrong.empty())
         c.wrong = said(tr("Core {} holds {:.0f} % {}: take another"), state.cores, 100 * state.coreTarget, target(scenery));
     return c;
 }
 
 Coaching biopsy(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
 {
-    if (state.cores == 0 || state.coreTarget < hit)
+    if (state.cores == 0 || state.bestTarget < hit)
         return approach(scenery, state, view);
     if (state.phase != channel::Phase::free)
         return {5, 5,
-                said(tr("Core {} holds {:.0f} % {}: draw the needle out"), state.cores, 100 * state.coreTarget,
+                said(tr("Core {} holds {:.0f} % {}: draw the needle out"), state.bestCore, 100 * state.bestTarget,
                      target(scenery)),
                 "", false};
     return {5, 5,
@@ -236,6 +240,9 @@ Coaching coach(const channel::Scenery& scenery, const channel::State& state, con
     if (state.status == channel::Status::faulted)
         return {1, 1, tr("End the session"), tr("The forces are off"), view.handIsHere};
     Coaching c = coachTask(scenery, state, view);
+    // Figures of a picture say it for longer; who fires too early is to know it at once.
+    if (state.refused >= 0 && state.time - state.refused < refusalSaid && state.phase != channel::Phase::inserted)
+        c.wrong = tr("The gun fires only inside the body");
     if (view.outOfSight && view.handIsHere && state.phase == channel::Phase::free && !c.last)
         c.wrong = lostTool(state, view);
     return c;

@@ -101,6 +101,11 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
         if (character == '?')
             controlsOf(w).showHelp();
     });
+    // Whoever closes the window is asked as by the key.
+    glfwSetWindowCloseCallback(window, [](GLFWwindow* w) {
+        glfwSetWindowShouldClose(w, GLFW_FALSE);
+        controlsOf(w).close();
+    });
     glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) {
         if (focused == GLFW_FALSE)
             controlsOf(w).hand_.release();
@@ -147,7 +152,7 @@ void Controls::button(int button, bool down)
             return;
     }
     if (button == GLFW_MOUSE_BUTTON_RIGHT && down && hand_.held())
-        return hand_.fire();
+        return fire();
     if (button == GLFW_MOUSE_BUTTON_LEFT && down && hand_.commands() && picture_.endsAt(point(cursor_)))
         return hand_.end();
     if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is()) {
@@ -212,6 +217,13 @@ void Controls::toggleHold()
     byKey_ = hand_.held();
 }
 
+// Below the list of keys nobody sees what the gun would hit.
+void Controls::fire()
+{
+    if (!helping_)
+        hand_.fire();
+}
+
 void Controls::step(glm::dvec3 direction, double steps, bool fine)
 {
     hand_.move(steps * (fine ? fineShare : 1.0) * depthStep * direction);
@@ -265,6 +277,7 @@ bool Controls::asksToClose() const
 // The window that commands a session ends it as it goes, and the key is "back" elsewhere: it asks.
 void Controls::close()
 {
+    used_ = true;
     const bool ends = hand_.commands() && !tryout_ && follower_.state().status == channel::Status::running;
     if (ends && !asksToClose()) {
         closing_ = Clock::now();
@@ -280,7 +293,7 @@ void Controls::close()
 std::string Controls::caption() const
 {
     if (asksToClose())
-        return tr("Q or Esc again ends the session");
+        return tr("Q, Esc or closing the window once more ends the session");
     if (playback_ != nullptr) {
         const Playback& p = *playback_;
         const std::string how = p.paused ? tr("PAUSED") : said(tr("REPLAY x {:Lg}"), p.speed.load());

@@ -111,6 +111,7 @@ private:
     void toggleHold();
     void moveProbe(const ultrasound::ProbeMove& by);
     void storePicture();
+    void fire();
     void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
     bool sceneHoldsProbe() const;
@@ -142,7 +143,7 @@ private:
     bool watches_ = false;  // only
     std::optional<Tryout> tryout_;
     std::optional<Clock::time_point>
-        closing_;  // when the key that closes was pressed, and ended a session if pressed again
+        closing_;  // when the window was to close, which ends a session if it is asked for again
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
     bool byKey_ = false;                        // a key has taken the tool: the mouse leaves it alone

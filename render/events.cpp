@@ -26,6 +26,8 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
                                                : EventKind::touching);
     if (now.cores > before.cores)
         add(EventKind::fired);
+    if (now.refused > before.refused)
+        add(EventKind::refused);
     if (now.marks > before.marks)
         events.push_back({now.time, EventKind::marked, now.marks, 0});
     if (now.marks < before.marks)
@@ -57,6 +59,8 @@ std::string words(const Event& event, const channel::Scenery& scenery)
             return said(tr("touching {}"), structure);
         case EventKind::fired:
             return said(tr("core: {:.0f} % target"), 100 * event.target);
+        case EventKind::refused:
+            return tr("fired outside the body");
         case EventKind::marked:
             return said(tr("mark {}"), event.structure);
         case EventKind::unmarked:

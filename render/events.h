@@ -16,6 +16,7 @@ enum class EventKind : std::uint8_t {
     veryNear,
     touching,
     fired,
+    refused,
     marked,
     unmarked,
     fault,

@@ -70,7 +70,7 @@ const std::vector<Controls::Key> Controls::keys{
      marked("  Space"),
      marked("fire the biopsy gun; so does the other mouse button"),
      {{GLFW_KEY_SPACE, 0, once}},
-     onHand<&MouseHand::fire>},
+     here<&Controls::fire>},
     {hand,
      "M",
      marked("mark the place of the tool; with Shift take the last mark back"),

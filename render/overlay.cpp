@@ -113,7 +113,7 @@ void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::Stat
                  : atRim      ? tr("at its rim")
                               : tr("INSIDE"),
                  good);
-    else if (distance <= 0)
+    else if (distance < (state.phase != channel::Phase::free ? scenery.toolRadius : 0))
         pen.pair(name + tr("  TOUCHED"), millimetresText(distance), red);
     else if (distance < scenery.warnDistance[s])
         pen.pair(name + tr("  NEAR") + when, millimetresText(distance), amber);
@@ -325,7 +325,8 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     pen.heading(tr("EVENTS"));
     for (auto event = events.rbegin(); event != events.rend() && pen.lines() > 0; ++event) {
         const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
-        const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear;
+        const bool warning =
+            event->kind == EventKind::near || event->kind == EventKind::veryNear || event->kind == EventKind::refused;
         const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
         pen.pair(words(*event, scenery), said("{:.1Lf} s", event->time), colour);
     }

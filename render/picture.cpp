@@ -381,11 +381,9 @@ void Picture::drawFlat(const ScreenPlan& plan)
     const bool apart = !plan.events.empty(), free = words_.empty() && help_.empty();
     double below = plan.height;
     if (s.known) {
-        // Help leaves room for title, caption and warning.
+        // Help leaves room for title, warning and, where it can, step, what is wrong and caption: the tool stays live.
         Header words = header();
         words.keysListed = !help_.empty();
-        if (words.keysListed)
-            words.coaching = {};
         lastStep_ = words.coaching.last;
         const HeaderPlaces places = drawHeader(canvas_, plan, s.scenery, s.state, words);
         step_ = places.step;

@@ -31,6 +31,12 @@ struct Diagram {
     double font, now, top;
 
     double x(double time) const { return inner.x + inner.width * (1 + (time - now) / traceSeconds); }
+    // The point `p`, or where the line from it to `q` comes down to the upper edge.
+    Point2 seen(const History::Point& p, const History::Point& q) const
+    {
+        const double part = p.value > top ? (p.value - top) / (p.value - q.value) : 0.0;
+        return {x(std::lerp(p.time, q.time, part)), y(std::lerp(p.value, q.value, part))};
+    }
     double y(double value) const { return inner.y + inner.height * std::clamp(value / top, 0.0, 1.0); }
 };
 
@@ -62,13 +68,15 @@ Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string
     return d;
 }
 
-// One point per pixel column is all that can be seen.
+// One point per pixel column is all that can be seen, and nothing above the upper edge: there are gaps.
 void draw(const Diagram& d, const History& history, const Curve& curve)
 {
     const auto points = history.columns(d.inner.width / traceSeconds, curve.value, curve.least);
-    for (std::size_t i = 1; i < points.size(); ++i)
-        d.canvas.line({d.x(points[i - 1].time), d.y(points[i - 1].value)}, {d.x(points[i].time), d.y(points[i].value)},
-                      curve.width, curve.colour);
+    for (std::size_t i = 1; i < points.size(); ++i) {
+        const auto &a = points[i - 1], &b = points[i];
+        if (std::isfinite(a.value) && std::isfinite(b.value) && std::min(a.value, b.value) <= d.top)
+            d.canvas.line(d.seen(a, b), d.seen(b, a), curve.width, curve.colour);
+    }
 }
 
 void drawAll(const Diagram& d, const Area& area, const History& history, const std::vector<Curve>& curves)

@@ -5,6 +5,7 @@
 #include <GLFW/glfw3.h>
 
 #include <base/error.h>
+#include <base/window_size.h>
 #include <render/controls.h>
 #include <render/display.h>
 #include <render/follower.h>
@@ -44,12 +45,11 @@ Window openWindow(const ViewerOptions& options)
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
     // A frame buffer with alpha would let the desktop shine through.
     glfwWindowHint(GLFW_ALPHA_BITS, 0);
-    int x = 0, y = 0, width = options.width, height = options.height;
-    if (GLFWmonitor* screen = glfwGetPrimaryMonitor(); screen != nullptr && !options.hidden) {
-        glfwGetMonitorWorkarea(screen, &x, &y, &width, &height);
-        width = std::min(width, options.width);
-        height = std::min(height, options.height);
-    }
+    int x = 0, y = 0;
+    base::WindowSize screen;
+    if (GLFWmonitor* first = glfwGetPrimaryMonitor(); first != nullptr && !options.hidden)
+        glfwGetMonitorWorkarea(first, &x, &y, &screen.width, &screen.height);
+    const auto [width, height] = base::fittedTo(screen, {options.width, options.height});
     Window window(glfwCreateWindow(width, height, "Palpate", nullptr, nullptr));
     base::failIf(!window, "the display has no OpenGL 3.2, which the viewer needs");
     glfwSetWindowSizeLimits(window.get(), leastSide, leastSide, GLFW_DONT_CARE, GLFW_DONT_CARE);

@@ -321,6 +321,8 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
             return "fault";
         case EventKind::stepDown:
             return "simpler model: ticks came late";
+        case EventKind::fireRefused:
+            return "fired outside the body: no core";
     }
     return {};
 }

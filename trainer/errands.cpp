@@ -1,15 +1,13 @@
 #include <trainer/errands.h>
 
 #include <base/outputs.h>
-#include <base/process.h>
 #include <base/temporary_folder.h>
 #include <base/user_files.h>
 #include <base/words.h>
+#include <trainer/commands.h>
 #include <trainer/film.h>
 #include <trainer/lists.h>
 #include <trainer/running.h>
-
-#include <unistd.h>
 
 #include <algorithm>
 #include <list>
@@ -25,8 +23,6 @@ namespace fs = std::filesystem;
 using base::tr;
 
 namespace {
-
-constexpr double answerTime = 30;  // of a short command, on a machine that has much to do [s]
 
 const char* opening()
 {
@@ -78,32 +74,9 @@ struct Errands::Impl {
         std::error_code none;
         fs::remove(std::exchange(state.ghost, {}), none);
     }
-    static std::string whyNot(const Running& command, const std::vector<std::string>& arguments)
-    {
-        const std::string said = command.message();
-        return said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
-    }
-    // What a command that needs profiles has said, or why there can be none.
-    static std::string aboutProfiles(const std::string& said)
-    {
-        const std::string why = said.empty() ? "" : whyNoProfiles();
-        return why.empty() ? said : why;
-    }
-    // What a short command writes as JSON; null where it fails, and the state says why.
-    nlohmann::json answerOf(State& state, std::vector<std::string> arguments)
-    {
-        const fs::path file = scratch / "answer.json";
-        fs::remove(file);
-        arguments.insert(arguments.end(), {"--json", file.string()});
-        Running command(programs / "palpate", arguments, scratch / "answer.log");
-        command.finish(answerTime);
-        auto answer = parsed(file);
-        state.notice = answer.is_discarded() ? whyNot(command, arguments) : state.notice;
-        return answer;
-    }
     void listPeople(State& state)
     {
-        const auto answer = answerOf(state, {"profile", "list"});
+        const auto answer = commands.answer({"profile", "list"}, state.notice);
         if (answer.is_discarded()) {
             state.notice = aboutProfiles(state.notice);
             return;  // who was there stays
@@ -113,25 +86,25 @@ struct Errands::Impl {
     // What there was stays where the command fails.
     void listCases(State& state)
     {
-        if (const auto answer = answerOf(state, {"case", "list"}); !answer.is_discarded()) {
-            state.cases = casesOf(answer);
+        if (const auto answer = commands.answer({"case", "list"}, state.notice); !answer.is_discarded()) {
+            casesListed(state, casesOf(answer));
+            showBest(state);
+        }
+    }
+    // Of who trains, or of the folder's sessions.
+    void showBest(State& state)
+    {
+        for (CaseEntry& c : state.cases) {
+            c.best = state.person.empty() ? sink.best(c) : state.progress.best(c.id);
         }
     }
     void listCurricula(State& state)
     {
-        if (const auto answer = answerOf(state, {"curriculum", "list"}); !answer.is_discarded()) {
+        if (const auto answer = commands.answer({"curriculum", "list"}, state.notice); !answer.is_discarded()) {
             curricula.clear();
             each(answer, "curricula",
                  [this](const auto& one) { curricula.push_back(one.at("id").template get<std::string>()); });
         }
-    }
-    // A short command that writes no JSON. Returns whether it did what it was asked; else the state says why not.
-    bool did(State& state, const std::vector<std::string>& arguments)
-    {
-        Running command(programs / "palpate", arguments, scratch / "short.log");
-        const bool done = command.finish(answerTime) && !command.failed();
-        state.notice = done ? "" : whyNot(command, arguments);
-        return done;
     }
     std::vector<std::string> progressWords(const std::string& whose) const
     {
@@ -141,22 +114,49 @@ struct Errands::Impl {
         }
         return words;
     }
-    // The curve of who trains, and the best scores: of that person, or of the folder's sessions.
+    // The curve of who trains, and the best scores.
     void choosePerson(State& state)
     {
-        progressLoaded(state, state.person.empty() ? Progress() : progressIn(answerOf(state, progressWords(state.person))));
+        progressLoaded(state, state.person.empty()
+                                  ? Progress()
+                                  : progressIn(commands.answer(progressWords(state.person), state.notice)));
         if (state.settings.person != state.person) {
             state.settings.person = state.person;
             state.notice = writeSettings(base::trainerSettings(), state.settings);
         }
-        for (CaseEntry& c : state.cases) {
-            c.best = state.person.empty() ? sink.best(c) : state.progress.best(c.id);
+        showBest(state);
+    }
+    // What there is may change outside: cases and curricula are listed again where a screen that shows them is entered,
+    // people whenever their file changes.
+    bool lookAtLists(State& state)
+    {
+        const bool entered = std::exchange(listedAt, state.screen) != state.screen;
+        const bool shows =
+            state.screen == Screen::cases || state.screen == Screen::progress || state.screen == Screen::instructor;
+        if (entered && shows) {
+            listCases(state);
+            const auto before = curricula;
+            listCurricula(state);
+            curricula != before ? choosePerson(state) : void();
+        }
+        const auto now = writtenAt(profilesFile());
+        const bool others = !state.running && std::exchange(profilesRead, now) != now;
+        others ? listPeopleAgain(state) : void();
+        return others || (entered && shows);
+    }
+    void listPeopleAgain(State& state)
+    {
+        const std::string before = state.person;
+        state.screen == Screen::instructor ? loadEverybody(state) : listPeople(state);
+        if (state.person != before) {
+            choosePerson(state);
+            state.screen == Screen::progress ? static_cast<void>(goBack(state)) : void();
         }
     }
     void changeHand(State& state)
     {
         if (const PersonEntry* const person = chosenPerson(state)) {
-            did(state, {"profile", "hand", person->name, person->leftHanded ? "left" : "right"});
+            commands.did({"profile", "hand", person->name, person->leftHanded ? "left" : "right"}, state.notice);
         }
         listPeople(state);
     }
@@ -165,28 +165,21 @@ struct Errands::Impl {
         base::makeFolders(sink.folder());
         return sink.folder() / base::plainName(name);
     }
-    // With what the desktop opens pages with; where it has nothing, the notice says where the page is.
-    static void open(const fs::path& page)
-    {
-        if (::access("/usr/bin/xdg-open", X_OK) == 0) {
-            base::start({{"/usr/bin/xdg-open", page.string()}, {-1, -1, -1}, true});
-        }
-    }
     void writeProgress(State& state)
     {
         const fs::path base = output(base::progressPages(state.person));
         std::vector<std::string> words = progressWords(state.person);
         words.insert(words.end(), {"--html", base.string() + ".html", "--csv", base.string() + ".csv", "--xapi",
                                    base.string() + ".xapi.json"});
-        if (did(state, words)) {
+        if (commands.did(words, state.notice)) {
             state.notice = base.string() + tr(": page (.html), table (.csv), xAPI statements (.xapi.json)");
-            open(base.string() + ".html");
+            openPage(base.string() + ".html");
         }
     }
     void loadEverybody(State& state)
     {
         listPeople(state);
-        const auto answer = state.people.empty() ? nlohmann::json() : answerOf(state, {"progress", "--all"});
+        const auto answer = state.people.empty() ? nlohmann::json() : commands.answer({"progress", "--all"}, state.notice);
         everybodyLoaded(state, answer.is_discarded() ? state.instructor.everybody : progressIn(answer));
     }
     void watchSession(State& state) { watch(state, "--session"); }
@@ -204,8 +197,9 @@ struct Errands::Impl {
         const Instructor& i = state.instructor;
         if (i.chosen < i.everybody.sessions.size()) {
             const KeptSession& s = i.everybody.sessions[i.chosen];
-            if (did(state, {"profile", "note", s.name, std::to_string(s.number), "--text=" + i.note, "--rating",
-                            std::to_string(i.rating)})) {
+            if (commands.did({"profile", "note", s.name, std::to_string(s.number), "--text=" + i.note, "--rating",
+                              std::to_string(i.rating)},
+                             state.notice)) {
                 noteKept(state);
                 loadEverybody(state);
             }
@@ -223,10 +217,10 @@ struct Errands::Impl {
             words.insert(words.end(), {"--html", page.string()});
         }
         state.notice.clear();
-        state.instructor.comparison = comparisonIn(answerOf(state, words));
+        state.instructor.comparison = comparisonIn(commands.answer(words, state.notice));
         if (state.instructor.asPage && state.notice.empty()) {
             state.notice = page.string();
-            open(page);
+            openPage(page);
         }
     }
     // Looks at the sessions that run as long as somebody looks at them.
@@ -246,15 +240,15 @@ struct Errands::Impl {
         if (const auto written = fs::last_write_time(file, none); !none && written != liveRead) {
             liveRead = written;
             state.instructor.live = liveIn(parsed(file));
+            return true;
         }
         return false;
     }
     void addPerson(State& state)
     {
         const std::string name = state.newPerson;
-        Running command(programs / "palpate", {"profile", "new", "--", name}, scratch / "person.log");
-        command.finish(answerTime);
-        state.notice = aboutProfiles(command.message());
+        commands.did({"profile", "new", "--", name}, state.notice);
+        state.notice = aboutProfiles(state.notice);
         listPeople(state);
         if (std::ranges::find(state.people, name, &PersonEntry::name) != state.people.end()) {
             state.person = name;
@@ -322,8 +316,8 @@ struct Errands::Impl {
         } else {
             grip.letGo();
         }
-        state.gripReady = grip.ready();
-        return false;
+        const bool before = std::exchange(state.gripReady, grip.ready());
+        return state.gripReady != before;
     }
 
     bool lookAtDevices(State& state)
@@ -431,8 +425,11 @@ struct Errands::Impl {
     fs::path expertOf, besideExpert;  // record of the expert that is made, and of the session that it is for
     fs::path programs;
     const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
+    const Commands commands{programs, scratch.path()};
     ResultSink& sink;
-    std::vector<std::string> curricula;  // that there are
+    std::vector<std::string> curricula;                           // that there are
+    Screen listedAt = Screen::cases;                              // when cases were last listed
+    fs::file_time_type profilesRead = writtenAt(profilesFile());  // when the people were
     std::optional<Running> session, devices, replay, push, tryout, expert, live;
     Film film;
     bool ending = false;  // the session was told to end
@@ -450,6 +447,7 @@ Errands::~Errands() = default;
 void Errands::list(State& state)
 {
     try {
+        impl_->profilesRead = writtenAt(profilesFile());
         impl_->listCases(state);
         state.person = state.settings.person;
         impl_->listPeople(state);
@@ -502,8 +500,8 @@ bool Errands::look(State& state)
 {
     using Look = bool (Impl::*)(State&);
     bool changed = false;
-    for (const Look part : {&Impl::lookAtDevices, &Impl::lookAtSession, &Impl::lookAtHelpers, &Impl::lookAtLive,
-                            &Impl::lookAtGrip, &Impl::lookAtReplay}) {
+    for (const Look part : {&Impl::lookAtLists, &Impl::lookAtDevices, &Impl::lookAtSession, &Impl::lookAtHelpers,
+                            &Impl::lookAtLive, &Impl::lookAtGrip, &Impl::lookAtReplay}) {
         try {
             changed = ((*impl_).*part)(state) || changed;
         } catch (const std::exception& e) {

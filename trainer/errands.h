@@ -19,12 +19,12 @@ public:
     /// Ends what runs, in order.
     ~Errands();
 
-    /// The cases and the profiles that there are.
+    /// The cases, the profiles and the curricula that there are.
     void list(State& state);
     /// Never throws for what the user can mend: that stands in the state's notice.
     void run(Errand errand, State& state);
-    /// Looks what has ended, and tells the state. To be called often. Returns whether something changed. Never throws for
-    /// what went wrong outside: that stands in the state's notice.
+    /// Looks what has ended and what there is anew, and tells the state. To be called often. Returns whether something
+    /// changed. Never throws for what went wrong outside: that stands in the state's notice.
     bool look(State& state);
     /// What was pressed at a device's grip since this was last called.
     std::vector<Press> pressed();

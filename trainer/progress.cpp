@@ -137,6 +137,20 @@ const char* inWords(Standing standing) noexcept
     return tr(words[static_cast<std::size_t>(standing)]);
 }
 
+std::vector<std::string> levelsInWords(const ExerciseEntry& e)
+{
+    std::vector<std::string> lines;
+    for (const Curve& c : e.curves) {
+        const std::string least = c.atLeast ? said(tr("at least {:Lg}"), *c.atLeast) : "";
+        const std::string most = c.atMost ? said(tr("at most {:Lg}"), *c.atMost) : "";
+        if (!least.empty() || !most.empty()) {
+            lines.push_back(c.label + ": " + least + (least.empty() || most.empty() ? "" : ", ") + most +
+                            (c.unit.empty() ? "" : " " + c.unit));
+        }
+    }
+    return lines;
+}
+
 std::string reasonFor(const ExerciseEntry& e)
 {
     if (e.standing == Standing::refresh) {

@@ -60,6 +60,8 @@ Progress progressIn(const nlohmann::json& figures);
 
 /// "locked", "open", "next", "reached", "to be refreshed", in the user's language.
 const char* inWords(ExerciseEntry::Standing standing) noexcept;
+/// What its levels ask for, "Passes: at most 2", one line each.
+std::vector<std::string> levelsInWords(const ExerciseEntry& exercise);
 /// Why it is next, or what its gate asks for.
 std::string reasonFor(const ExerciseEntry& exercise);
 

@@ -120,7 +120,10 @@ void drawExercise(State& state)
         words(said(tr("Case: {}"), at->title), quiet);
     }
     if (e.sessions == 0 || e.curves.empty()) {
-        words(tr("There is no session of it yet."));
+        words(tr("There is no session of it yet. It asks for:"));
+        for (const std::string& level : levelsInWords(e)) {
+            words("- " + level);
+        }
         return;
     }
     const float wide = ImGui::GetContentRegionAvail().x, em = ImGui::GetFontSize();

@@ -55,6 +55,11 @@ std::string levelInWords(const nlohmann::json& asked)
     return words + ": " + (met->get<bool>() ? tr("met") : tr("not met"));
 }
 
+std::string withUnit(double value, int decimals, const std::string& unit)
+{
+    return said("{:.{}Lf}{}{}", value, decimals, unit.empty() ? "" : " ", unit);
+}
+
 // What the case is about, and the levels of the exercise. Labels of those that are shown already stay; the total, in large
 // letters, is one of them.
 void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map<std::string, std::size_t>& rows,
@@ -69,7 +74,7 @@ void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map
             rows[key] = result.measures.size();
             const std::string unit = tr(one.at("unit").get<std::string>());
             result.measures.emplace_back(tr(one.at("label").get<std::string>()),
-                                         value ? said("{:.{}Lf} {}", *value, one.at("decimals").get<int>(), unit) : "-");
+                                         value ? withUnit(*value, one.at("decimals").get<int>(), unit) : "-");
         }
         if (rows.contains(key)) {
             result.measures[rows[key]].second += level;
@@ -105,7 +110,7 @@ void addMeasures(const nlohmann::json& asked, const nlohmann::json& score, const
         }
         if (const auto value = numberAt(score, key)) {
             rows[key] = result.measures.size();
-            result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", *value, decimals, unit));
+            result.measures.emplace_back(tr(label), withUnit(*value, decimals, unit));
         }
     }
     addAsked(asked, score, rows, result);
@@ -267,6 +272,11 @@ std::string whyNoProfiles()
 {
     const fs::path folder = base::userFolder(base::UserFolder::data);
     return canBeWritten(folder) ? "" : said(tr("{}: no profiles can be kept there, and so no progress."), folder.string());
+}
+
+fs::path profilesFile()
+{
+    return base::userFolder(base::UserFolder::data) / "profiles.db";
 }
 
 fs::path sessionsFolder()

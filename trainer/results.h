@@ -49,6 +49,8 @@ private:
 std::string whyNoSessions(const std::filesystem::path& folder);
 /// The same of profiles, which are in base::UserFolder::data.
 std::string whyNoProfiles();
+/// Where `palpate profile` keeps them.
+std::filesystem::path profilesFile();
 
 /// `sessions` of base::UserFolder::data; without a home, of a folder for temporary files.
 std::filesystem::path sessionsFolder();

@@ -2,6 +2,7 @@
 
 #include <base/error.h>
 #include <base/said.h>
+#include <base/window_size.h>
 #include <base/words.h>
 #include <trainer/case_pictures.h>
 #include <trainer/look.h>
@@ -16,8 +17,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <map>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,24 +48,46 @@ Window openWindow(int width, int height)
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
-    Window window(glfwCreateWindow(width, height, tr("Palpate trainer"), nullptr, nullptr));
+    int x = 0, y = 0;
+    base::WindowSize screen;
+    if (GLFWmonitor* const first = glfwGetPrimaryMonitor(); first != nullptr) {
+        glfwGetMonitorWorkarea(first, &x, &y, &screen.width, &screen.height);
+    }
+    const auto [wide, high] = base::fittedTo(screen, {width, height});
+    Window window(glfwCreateWindow(wide, high, tr("Palpate trainer"), nullptr, nullptr));
     base::failIf(!window, "{}", tr("the display has no OpenGL 3.2, which the window needs"));
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
     return window;
 }
 
+// What comes from keys and mouse, and what the desktop does with the window.
+//
 // ImGui looks at keys once per picture. A key that goes down and up between two pictures stays down for one, and so does
 // what was held with it.
-class Keys {
+class Input {
 public:
-    explicit Keys(GLFWwindow* window) : window_(window)
+    /// After ImGui's own callbacks, which these call.
+    explicit Input(GLFWwindow* window) : window_(window)
     {
         glfwSetWindowUserPointer(window, this);
-        glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int code, int action, int mods) {
-            static_cast<Keys*>(glfwGetWindowUserPointer(w))->heed(key, code, action, mods);
-        });
+        glfwSetKeyCallback(
+            window, [](GLFWwindow* w, int key, int code, int action, int mods) { of(w).heed(key, code, action, mods); });
+        glfwSetMouseButtonCallback(window, passOn<ImGui_ImplGlfw_MouseButtonCallback>);
+        glfwSetScrollCallback(window, passOn<ImGui_ImplGlfw_ScrollCallback>);
+        glfwSetCharCallback(window, passOn<ImGui_ImplGlfw_CharCallback>);
+        glfwSetWindowFocusCallback(window, passOn<ImGui_ImplGlfw_WindowFocusCallback>);
+        glfwSetCursorEnterCallback(window, passOn<ImGui_ImplGlfw_CursorEnterCallback>);
+        glfwSetCursorPosCallback(window, note);
+        glfwSetWindowRefreshCallback(window, note);
+        glfwSetFramebufferSizeCallback(window, note);
+        glfwSetWindowContentScaleCallback(window, note);
+        glfwSetWindowCloseCallback(window, note);
     }
+    /// Whether something came since the last call.
+    bool heard() noexcept { return std::exchange(heard_, false); }
+    /// By how many steps texts are to be larger, asked for by Ctrl and + or - since the last call.
+    int larger() noexcept { return std::exchange(larger_, 0); }
     /// As if a key, and another one with it, went down and up.
     void tap(int key, int with = none)
     {
@@ -87,8 +112,33 @@ private:
     struct Stroke {
         int key, code, mods;
     };
+    static Input& of(GLFWwindow* window) { return *static_cast<Input*>(glfwGetWindowUserPointer(window)); }
+    template <auto to, class... Args>
+    static void passOn(GLFWwindow* window, Args... args)
+    {
+        of(window).heard_ = true;
+        to(window, args...);
+    }
+    template <class... Args>
+    static void note(GLFWwindow* window, Args...)
+    {
+        of(window).heard_ = true;
+    }
+    // By what is on the key: where it is differs between keyboards.
+    static int sizeSteps(int key, int code)
+    {
+        const char* const name = glfwGetKeyName(key, code);
+        const std::string_view sign = name != nullptr ? name : "";
+        return key == GLFW_KEY_KP_ADD || sign == "+" || sign == "=" ? 1
+               : key == GLFW_KEY_KP_SUBTRACT || sign == "-"         ? -1
+                                                                    : 0;
+    }
     void heed(int key, int code, int action, int mods)
     {
+        heard_ = true;
+        if (action == GLFW_PRESS && (mods & GLFW_MOD_CONTROL) != 0) {
+            larger_ += sizeSteps(key, code);
+        }
         if (action == GLFW_RELEASE && pressed_) {
             released_.push_back({key, code, mods});
             return;
@@ -100,6 +150,8 @@ private:
     }
 
     GLFWwindow* window_;
+    bool heard_ = false;
+    int larger_ = 0;
     bool pressed_ = false;  // a key, since the last picture
     std::vector<Stroke> released_;
 };
@@ -114,6 +166,7 @@ public:
         ImGuiIO& io = ImGui::GetIO();
         io.ConfigFlags |= ImGuiConfigFlags_NavEnableKeyboard;
         io.IniFilename = nullptr;
+        io.ConfigInputTextCursorBlink = false;  // it would take pictures while nothing happens
         ImGui_ImplGlfw_InitForOpenGL(window, true);
         ImGui_ImplOpenGL3_Init("#version 150");
     }
@@ -214,18 +267,12 @@ public:
             ImGui_ImplOpenGL3_CreateFontsTexture();
         }
     }
-    /// In a picture. Returns whether it has changed.
-    bool heed(double& asked) const
+    /// By so many steps larger. Returns whether it has changed.
+    static bool change(double& asked, int steps)
     {
-        const ImGuiIO& io = ImGui::GetIO();
         constexpr double step = 1.25, least = 0.5, most = 3;
-        const auto pressed = [&](int key) { return io.KeyCtrl && ImGui::IsKeyPressed(key, false); };
         const double before = asked;
-        if (pressed(GLFW_KEY_EQUAL) || pressed(GLFW_KEY_KP_ADD)) {
-            asked = std::min(asked * step, most);
-        } else if (pressed(GLFW_KEY_MINUS) || pressed(GLFW_KEY_KP_SUBTRACT)) {
-            asked = std::max(asked / step, least);
-        }
+        asked = steps != 0 ? std::clamp(asked * std::pow(step, steps), least, most) : asked;
         return asked != before;
     }
 
@@ -236,13 +283,13 @@ private:
 }  // namespace
 
 struct Stage::Impl {
-    Impl(int width, int height) : window(openWindow(width, height)), gui(window.get()), keys(window.get()) {}
+    Impl(int width, int height) : window(openWindow(width, height)), gui(window.get()), input(window.get()) {}
 
     static constexpr int none = -1;
 
     Window window;
     Gui gui;
-    Keys keys;
+    Input input;
     Textures textures;
     TextScale scale;
     int shown = none;  // screen
@@ -280,36 +327,30 @@ void Stage::takeFocus()
 
 bool Stage::await(double seconds)
 {
-    if (seconds <= 0) {
-        glfwPollEvents();
-        return false;
-    }
-    const double begun = glfwGetTime();
-    glfwWaitEventsTimeout(seconds);
-    constexpr double nearly = 0.95;  // clocks differ
-    return glfwGetTime() - begun >= nearly * seconds;
+    seconds > 0 ? glfwWaitEventsTimeout(seconds) : glfwPollEvents();
+    return impl_->input.heard();
 }
 
 void Stage::press(Press what)
 {
     switch (what) {
         case Press::activate:
-            return impl_->keys.tap(GLFW_KEY_ENTER);
+            return impl_->input.tap(GLFW_KEY_ENTER);
         case Press::back:
-            return impl_->keys.tap(GLFW_KEY_ESCAPE);
+            return impl_->input.tap(GLFW_KEY_ESCAPE);
         case Press::next:
-            return impl_->keys.tap(GLFW_KEY_TAB);
+            return impl_->input.tap(GLFW_KEY_TAB);
         case Press::previous:
-            return impl_->keys.tap(GLFW_KEY_TAB, GLFW_KEY_LEFT_SHIFT);
+            return impl_->input.tap(GLFW_KEY_TAB, GLFW_KEY_LEFT_SHIFT);
     }
 }
 
 Drawn Stage::draw(State& state)
 {
     const auto begun = std::chrono::steady_clock::now();
+    const bool scaled = TextScale::change(state.settings.textScale, impl_->input.larger());
     impl_->scale.fit(impl_->window.get(), state.settings.textScale);
     impl_->gui.begin();
-    const bool scaled = impl_->scale.heed(state.settings.textScale);
     const bool entered = impl_->shown != static_cast<int>(state.screen);
     if (entered) {
         glfwSetWindowTitle(impl_->window.get(), (std::string(tr("Palpate trainer: ")) + nameOf(state.screen)).c_str());
@@ -320,7 +361,7 @@ Drawn Stage::draw(State& state)
         state, [this](const std::string& picture) { return impl_->textures.of(picture); }, size.x, size.y, entered);
     impl_->gui.end(impl_->window.get());
     return {errand == Errand::none && scaled ? Errand::keepSettings : errand,
-            std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(), impl_->keys.letGo()};
+            std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(), impl_->input.letGo()};
 }
 
 void Stage::renew()

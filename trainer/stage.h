@@ -18,7 +18,7 @@ struct Drawn {
 /// A window of GLFW that ImGui draws the trainer's screens into. One at a time. Not part of the interface.
 class Stage {
 public:
-    /// @param width, height  [pixels]
+    /// @param width, height  [pixels]; less on a screen that is smaller
     /// Throws std::runtime_error where there is no display with OpenGL 3.2.
     Stage(int width, int height);
     ~Stage();
@@ -32,7 +32,8 @@ public:
     bool focused() const;
     /// Has keys go to this window.
     void takeFocus();
-    /// Takes in what has happened; waits for something to happen, so long at most [s]. Returns whether it waited that long.
+    /// Takes in what has happened; waits for something to happen, so long at most [s]. Returns whether something was done
+    /// to the window, which a picture is to show.
     bool await(double seconds);
     /// The next picture sees the key that does the same.
     void press(Press what);

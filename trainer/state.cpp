@@ -63,13 +63,13 @@ std::vector<std::string> stepsOf(const State& state)
     if (state.useFalcon) {
         steps.emplace_back(c.palpation ? tr("Hold the centre button of the grip: you hold the fingertip. Push to press.")
                                        : tr("Hold the centre button of the grip: you hold the needle. Push it in."));
-        steps.front() += c.core ? " " + std::string(tr("The forward button fires.")) : "";
+        steps.front() += c.core ? " " + std::string(tr("The forward button fires, once the needle is inside.")) : "";
     } else {
         steps.emplace_back(c.palpation ? tr("Hold the mouse button of your index finger in the picture, or press Enter: "
                                             "you hold the fingertip. The wheel forward, or Page down, presses.")
                                        : tr("Hold the mouse button of your index finger in the picture, or press Enter: "
                                             "you hold the needle. The wheel forward, or Page down, pushes it in by 1 mm."));
-        steps.front() += c.core ? " " + std::string(tr("Space fires.")) : "";
+        steps.front() += c.core ? " " + std::string(tr("Space fires, once the needle is inside.")) : "";
     }
     steps.insert(steps.end(), c.steps.begin(), c.steps.end());
     if (state.useFalcon) {
@@ -278,6 +278,14 @@ void noteKept(State& state)
     s.note = i.note;
     s.rating = i.rating;
     noteTyped(state);
+}
+
+void casesListed(State& state, std::vector<CaseEntry> cases)
+{
+    const std::string id = state.cases.empty() ? "" : chosenCase(state).id;
+    state.cases = std::move(cases);
+    const auto at = std::ranges::find(state.cases, id, &CaseEntry::id);
+    state.chosen = at != state.cases.end() ? static_cast<std::size_t>(at - state.cases.begin()) : 0;
 }
 
 void peopleListed(State& state, std::vector<PersonEntry> people)

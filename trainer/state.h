@@ -167,6 +167,8 @@ void noteTyped(State& state);
 /// Instructor's screen: note and rating of the chosen session, as they were typed, are kept.
 /// @pre  there is one
 void noteKept(State& state);
+/// What `palpate case list` has said. The chosen case stays chosen.
+void casesListed(State& state, std::vector<CaseEntry> cases);
 /// What `palpate profile list` has said. Whoever is in a group and has no profile any more leaves it, and a comparison
 /// goes.
 void peopleListed(State& state, std::vector<PersonEntry> people);

@@ -45,16 +45,17 @@ class Presses {
 public:
     Presses(Stage& stage, Errands& errands) : stage_(stage), errands_(errands) {}
 
-    /// Waits until something happens.
-    void await(const State& state)
+    /// Waits until something happens. Returns whether something was done to the window.
+    bool await(const State& state)
     {
-        bool nothing = true;
-        for (double left = idle; nothing && left > 0 && waiting_.empty();) {
+        bool happened = false;
+        for (double left = idle; !happened && left > 0 && waiting_.empty();) {
             const double slice = state.gripReady ? std::min(betweenLooks, left) : left;
-            nothing = stage_.await(slice);
+            happened = stage_.await(slice);
             left -= slice;
             take();
         }
+        return happened;
     }
     /// Before a picture. Returns whether one more is needed.
     bool work(const State& state)
@@ -89,29 +90,29 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     State state = stateOf(options, errands);
     Presses presses(stage, errands);
     std::vector<double> seconds;
-    int due = 0;  // pictures until all has settled
+    constexpr int settling = 2;
+    int due = settling;  // pictures until all has settled
     while (!base::EndInOrder::asked() && (options.frames == 0 || seconds.size() < options.frames)) {
         if (stage.closed() && leave(state) == Errand::quit) {
             break;
         }
         stage.stay();
-        if (options.frames == 0 && due == 0) {
-            presses.await(state);
-            due = 2;
-        } else {
-            stage.await(0);
-        }
+        bool news = options.frames == 0 && due == 0 ? presses.await(state) : stage.await(0);
         const bool wasRunning = state.running;
         // Buttons work what keys work: the window that has the focus.
         state.listening = options.frames == 0 && stage.focused();
-        errands.look(state);
+        news = errands.look(state) || news;
         if (wasRunning && !state.running) {
             stage.takeFocus();  // from the session's window, which is gone
         }
         const bool pressed = presses.work(state);
+        due = news || pressed ? settling : due;
+        if (options.frames == 0 && due == 0) {
+            continue;
+        }
         const Drawn drawn = stage.draw(state);
         seconds.push_back(drawn.seconds);
-        due = drawn.unsettled || pressed ? 2 : std::max(due - 1, 0);
+        due = drawn.unsettled || pressed || drawn.errand != Errand::none ? settling : due - 1;
         if (drawn.errand == Errand::quit) {
             break;
         }

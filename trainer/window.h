@@ -11,7 +11,7 @@ namespace palpate::trainer {
 
 struct WindowOptions {
     std::filesystem::path programs;  // folder of palpate and palpate-view
-    int width = 1280, height = 720;  // [pixels]
+    int width = 1280, height = 720;  // [pixels]; less on a screen that is smaller
     double textScale = 0;            // 0.5 to 3; 0: that of the settings
     std::string caseId;              // that is chosen at first; empty: the first
     std::uint64_t frames = 0;        // end after so many pictures, drawn one after the other; 0: no limit

@@ -154,6 +154,10 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     // The notch lies 2 to 22 mm ahead of the tip.
     advance(user, axis, 6e-3);
     EXPECT_EQ(user.sees().phase, channel::Phase::inserted);
+    user.key("F1");
+    user.key("space");
+    EXPECT_EQ(user.sees().cores, 0U) << "below the list of keys nobody sees what the gun would hit";
+    user.key("F1");
     user.key("space");
     EXPECT_EQ(user.sees().cores, 1U);
     withdraw(user, axis);

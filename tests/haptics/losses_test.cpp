@@ -239,6 +239,25 @@ TEST(Losses, ABiopsyWithoutAShotIsScoredAsBefore)
     }
 }
 
+// Who fires too early is told so, and when, and not that the gun was left alone.
+TEST(Losses, AShotOutsideTheBodyIsNoGunThatWasNotFired)
+{
+    const SessionInfo info = synthetic::info();
+    LossWatch watch(info);
+    for (std::uint64_t n = 0; n < 1000; ++n) {
+        TickRecord tick;
+        tick.tick = n;
+        tick.phase = n < 500 ? Phase::free : Phase::contact;
+        tick.distance = {1, 1, 1};
+        if (n == 250) {
+            synthetic::addEvent(tick, synthetic::event(EventKind::fireRefused, 0xFF, 0, 0));
+        }
+        watch.add(tick);
+    }
+    EXPECT_EQ(inWords(watch.losses(info)[0]),
+              "-75 points: The gun was fired only outside the body: there is no core (at 0.2 s)");
+}
+
 TEST(Losses, OfEveryTaskAddUpToAHundredWithTheTotal)
 {
     std::mt19937_64 random(5);

@@ -159,7 +159,8 @@ channel::State storyState(const channel::Scenery& scenery, double t)
     s.ahead[1] = std::numeric_limits<double>::infinity();
     s.aheadSpeed = t > punctureAt && t < arrivalAt ? 20e-3 : 0;
     s.cores = t >= fireAt ? 1 : 0;
-    s.coreTarget = t >= fireAt ? 0.83 : 0;
+    s.coreTarget = s.bestTarget = t >= fireAt ? 0.83 : 0;
+    s.bestCore = s.cores;
     s.coreLength = t >= fireAt ? 14.2e-3 : 0;
     s.tickP99 = 312e-6;
     s.status = t >= storySeconds ? channel::Status::finished : channel::Status::running;

@@ -1,5 +1,7 @@
 #include <render/canvas.h>
 #include <render/display.h>
+#include <render/history.h>
+#include <render/traces.h>
 
 #include <gtest/gtest.h>
 
@@ -8,6 +10,7 @@
 #include <vtkRenderWindow.h>
 #include <vtkWindowToImageFilter.h>
 
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -36,6 +39,10 @@ protected:
             canvas.text({390, 50}, ".", 9, {0.2, 0.2, 0.2});
         canvas.text({5, 20}, words, size, colour, Align::left, bold);
         canvas.end();
+        return light();
+    }
+    double light()
+    {
         window_->Render();
         vtkNew<vtkWindowToImageFilter> grab;
         grab->SetInput(window_);
@@ -68,6 +75,32 @@ TEST_F(CanvasTest, BoldStaysBoldWhateverElseIsWritten)
     const double fresh = lightOf(canvas, "push along the needle", size, second, true, true);
     EXPECT_GT(fresh, 1.1 * thin);
     EXPECT_NEAR(later, fresh, 0.03 * fresh);
+}
+
+// What lies beyond 40 mm is no flat line at 40 mm: there is a gap, as for what has no distance.
+TEST_F(CanvasTest, ATraceHasGapsAboveItsUpperEdge)
+{
+    window_->SetSize(400, 200);
+    Canvas canvas(*renderer_);
+    channel::Scenery scenery;
+    scenery.structures = 1;
+    const auto lightAt = [&](float before, float after) {
+        History history;
+        for (int i = 0; i < 100; ++i) {
+            history.moments.emplace_back();
+            history.moments.back().time = 0.1 * i;
+            history.moments.back().distance[0] = i < 50 ? before : after;
+        }
+        canvas.begin();
+        drawDistanceTraces(canvas, {0, 0, 400, 200}, 10, scenery, history);
+        canvas.end();
+        return light();
+    };
+    const double none = lightAt(INFINITY, INFINITY);
+    EXPECT_EQ(lightAt(60e-3F, 45e-3F), none);
+    EXPECT_GT(lightAt(20e-3F, 20e-3F), none);
+    EXPECT_GT(lightAt(60e-3F, 20e-3F), none);
+    EXPECT_LT(lightAt(60e-3F, 20e-3F), lightAt(20e-3F, 20e-3F));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::render {
@@ -77,8 +78,8 @@ TEST(Coach, LeadsThroughABiopsyStepByStep)
     CoachView onPicture = view;
     onPicture.scanned = true;  // where the other button moves the probe
     EXPECT_EQ(coach(scenery, s, onPicture).now, "Fire the gun (Space)");
-    s.cores = 1;
-    s.coreTarget = 0.6;
+    s.cores = s.bestCore = 1;
+    s.coreTarget = s.bestTarget = 0.6;
     EXPECT_NE(coach(scenery, s, view).now.find("60 % tumour: draw the needle out"), std::string::npos);
     s.phase = channel::Phase::free;
     EXPECT_NE(coach(scenery, s, view).now.find("end the session (E, or click here)"), std::string::npos);
@@ -138,6 +139,52 @@ TEST(Coach, AMissBeginsAnew)
     const Coaching c = coach(needleScenery(), s, view);
     EXPECT_EQ(c.step, 3);
     EXPECT_EQ(c.wrong, "Core 1 holds 0 % tumour: take another");
+}
+
+// The score takes the best core: a later shot beside it, or into the hole of the first, sends nobody back.
+TEST(Coach, ALaterMissTakesNoStepBack)
+{
+    channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
+    s.distance[0] = 6e-3;
+    s.cores = 10;
+    s.bestCore = 1;
+    s.bestTarget = 0.57;
+    const Coaching c = coach(needleScenery(), s, view);
+    EXPECT_EQ(c.step, 5);
+    EXPECT_EQ(c.now, "Core 1 holds 57 % tumour: draw the needle out");
+    EXPECT_EQ(c.wrong, "");
+}
+
+// What cores have taken is on the line no more: a line through the target's middle, or 3 mm beside that of a target of
+// 10 mm, passes no target for that, and one 9 mm beside does.
+TEST(Coach, ATargetThatWasTakenIsNotPassed)
+{
+    for (const auto& [aside, told] :
+         {std::pair{0.0, ""},
+          {0.4e-3, ""},
+          {3e-3, ""},
+          {9e-3, "The needle passes the tumour: its middle lies 9 mm towards the patient's right"}}) {
+        channel::State s = stateAt(aside, 5e-3, 0, channel::Phase::inserted);
+        s.distance[0] = std::hypot(15e-3, aside) - 5e-3;
+        s.cores = 1;
+        s.coreTarget = s.bestTarget = 0.05;
+        const std::string wrong = coach(needleScenery(), s, view).wrong;
+        EXPECT_EQ(wrong, *told != 0 ? told : "Core 1 holds 5 % tumour: take another") << aside;
+    }
+}
+
+TEST(Coach, SaysForTwoSecondsThatTheGunFiresOnlyInside)
+{
+    channel::State s = stateAt(0, -0.01, -12e-3, channel::Phase::free);
+    s.time = s.refused = 0.5;
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "The gun fires only inside the body");
+    s.time = 2.49;
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "The gun fires only inside the body");
+    s.time = 2.51;
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "The tip is 12 mm off the line, towards the feet");
+    s.time = 0.6;
+    s.phase = channel::Phase::inserted;
+    EXPECT_NE(coach(needleScenery(), s, view).wrong, "The gun fires only inside the body");
 }
 
 TEST(Coach, APalpationAsksForTwoMarksAndSaysNothingOfTheLump)

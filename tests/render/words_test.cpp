@@ -93,6 +93,21 @@ TEST_F(WordsTest, TheListOfKeysLiesOnNoOtherWords)
     studio->resize(width, height);
 }
 
+// The tool stays live below the list: what to do and what is wrong can be read above it.
+TEST_F(WordsTest, TheListOfKeysLeavesTheStepInSight)
+{
+    Picture& picture = studio->picture();
+    picture.setHelp({{"?", "shows the keys"}, {"L", "changes the layout"}});
+    picture.setSteps(true, true);
+    studio->resize(1280, 960);
+    studio->take(0.05, Layout::trainee, true);
+    const auto listed = picture.written();
+    EXPECT_TRUE(std::ranges::any_of(listed, [](const Written& w) { return w.words.starts_with("1/5  "); }));
+    picture.setHelp({});
+    picture.setSteps(false, false);
+    studio->resize(width, height);
+}
+
 // Scale, console and the mark of the probe's side, with caption and step above them.
 TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
 {

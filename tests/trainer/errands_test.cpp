@@ -123,6 +123,77 @@ echo '{"cases": [{"id": "a", "title": "A", "picture": "", "difficulty": 1, "trai
     }
 }
 
+// A case that was added while the window is open is there when the list is entered again, and the chosen one stays.
+TEST(Errands, CasesAreListedAgainWhereTheyAreShown)
+{
+    const Folder folder;
+    const auto offer = [&](const std::string& cases) {
+        makeScript(folder / "palpate", "for last; do :; done\necho '{\"cases\": [" + cases + "]}' > \"$last\"");
+    };
+    const auto entry = [](const std::string& id) {
+        return R"({"id": ")" + id +
+               R"(", "title": "A", "picture": "", "difficulty": 1, "trains": [], "measures": [], "briefing": []})";
+    };
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    offer(entry("b"));
+    errands.list(state);
+    ASSERT_EQ(state.cases.size(), 1U) << state.notice;
+    offer(entry("a") + ", " + entry("b"));
+    EXPECT_FALSE(errands.look(state)) << "nothing runs for a screen that stays";
+    EXPECT_EQ(state.cases.size(), 1U);
+    state.screen = Screen::result;
+    errands.look(state);
+    EXPECT_EQ(state.cases.size(), 1U);
+    state.screen = Screen::cases;
+    EXPECT_TRUE(errands.look(state));
+    EXPECT_EQ(state.cases.size(), 2U);
+    EXPECT_EQ(chosenCase(state).id, "b");
+}
+
+// Somebody who was erased in a terminal is gone from the window, from its groups and from its curve.
+TEST(Errands, WhoWasErasedElsewhereIsGone)
+{
+    const Folder folder;
+    const char* const before = std::getenv("XDG_DATA_HOME");
+    const std::string kept = before != nullptr ? before : "";
+    ::setenv("XDG_DATA_HOME", folder.path().c_str(), 1);
+    std::filesystem::create_directories(profilesFile().parent_path());
+    std::ofstream(profilesFile()) << "1";
+    const std::filesystem::path programs = folder / "programs";
+    std::filesystem::create_directories(programs);
+    const auto offer = [&](const std::string& people) {
+        makeScript(programs / "palpate",
+                   "test \"$2\" = --group && { echo 'palpate: ada: is not there' >&2; exit 1; }\n"
+                   "for last; do :; done\necho '{\"profiles\": [" +
+                       people + "]}' > \"$last\"");
+    };
+    const std::string ada = R"({"name": "ada", "hand": "left"})", bert = R"({"name": "bert", "hand": "left"})";
+    SessionFolder sink(folder / "sessions");
+    Errands errands(programs, sink);
+    State state;
+    state.settings.person = "ada";
+    offer(ada + ", " + bert);
+    errands.list(state);
+    ASSERT_EQ(state.people.size(), 2U) << state.notice;
+    ASSERT_EQ(state.person, "ada");
+    putIntoGroup(state, "ada", 1);
+    putIntoGroup(state, "bert", 2);
+    errands.run(Errand::compareGroups, state);
+    EXPECT_EQ(state.notice, "That did not work:\npalpate: ada: is not there");
+    errands.look(state);
+    EXPECT_EQ(state.people.size(), 2U);
+    offer(bert);
+    std::filesystem::last_write_time(profilesFile(),
+                                     std::filesystem::last_write_time(profilesFile()) + std::chrono::seconds(1));
+    EXPECT_TRUE(errands.look(state));
+    before != nullptr ? ::setenv("XDG_DATA_HOME", kept.c_str(), 1) : ::unsetenv("XDG_DATA_HOME");
+    EXPECT_EQ(state.people.size(), 1U);
+    EXPECT_EQ(state.person, "");
+    EXPECT_EQ(groupOf(state.instructor, "ada"), 0);
+}
+
 TEST(Errands, AKeptNoteIsNoDraftThoughANewerSessionHasEnded)
 {
     const Folder folder;

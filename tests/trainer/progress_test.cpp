@@ -45,6 +45,7 @@ TEST(Progress, IsReadAsTheCommandWritesIt)
     EXPECT_EQ(e.curves[1].values[1], 60.5);
     EXPECT_TRUE(std::isnan(e.curves[0].values[0])) << "a session without a value";
     EXPECT_TRUE(e.curves[0].atLeast == 1.0 && !e.curves[0].atMost);
+    EXPECT_EQ(levelsInWords(e), std::vector<std::string>{"Passes: at least 1"}) << "also of one without a session";
     EXPECT_EQ(e.alarm.atMost, 2.9);
     EXPECT_EQ(e.learning.values.size(), 2U);
     EXPECT_EQ(p.next(), 0U);

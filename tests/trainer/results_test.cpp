@@ -67,7 +67,7 @@ TEST(Results, WhatTheCaseIsAboutAndTheLevelsAreShown)
     const Result r = readResult(folder / "a.json");
     ASSERT_EQ(r.measures.size(), 4U) << r.problem;
     EXPECT_EQ(r.measures[1].second, "2.04 N, at most 2: not met");
-    EXPECT_EQ(r.measures[2], std::pair(std::string("CT scans"), std::string("3 ")));
+    EXPECT_EQ(r.measures[2], std::pair(std::string("CT scans"), std::string("3")));
     EXPECT_EQ(r.measures[3].second, "71 %, at least 60: met");
 }
 

@@ -325,8 +325,10 @@ TEST(Cases, AreReadAsTheCommandListsThem)
     EXPECT_NE(stepsOf(state)[0].find("the needle. The wheel"), std::string::npos);
     EXPECT_EQ(stepsOf(state)[1], "Reach it.");
     state.useFalcon = true;
-    EXPECT_EQ(stepsOf(state)[0],
-              "Hold the centre button of the grip: you hold the needle. Push it in. The forward button fires.");
+    EXPECT_EQ(
+        stepsOf(state)[0],
+        "Hold the centre button of the grip: you hold the needle. Push it in. The forward button fires, once the needle is "
+        "inside.");
     EXPECT_EQ(stepsOf(state)[2], "The left button, held for a second, ends the session. S pauses.");
     state.chosen = 0;
     EXPECT_EQ(stepsOf(state).size(), 4U);
