@@ -122,6 +122,13 @@ std::vector<Setting> readSettings(Section& top, std::string_view key)
     return out;
 }
 
+datasets::Scene readScene(Section& top, const std::filesystem::path& origin, SceneSource baseScene)
+{
+    const auto scene = top.word("scene");
+    top.missingIf(!scene, "scene", "a built-in scene, a scene file or a volume");
+    return baseScene(*scene, origin);
+}
+
 void readDesign(Section& top, SweepPlan& plan)
 {
     auto section = top.section("design");
@@ -327,9 +334,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.text = text;
     plan.name = top.word("name").value_or(origin.stem().string());
     plan.about = top.word("about").value_or("");
-    const auto scene = top.word("scene");
-    top.missingIf(!scene, "scene", "a built-in scene, a scene file or a volume");
-    plan.base = baseScene(*scene, origin);
+    plan.base = readScene(top, origin, baseScene);
     plan.seed =
         static_cast<std::uint64_t>(top.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
     plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, maxSamples).value_or(1));
@@ -363,6 +368,13 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     probeCases(plan, origin.string());
     probeOutputs(plan, origin.string());
     return plan;
+}
+
+datasets::Scene sceneOfPlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene)
+{
+    const toml::table root = datasets::parseToml(text, origin.string());
+    Section top(root, origin.string(), "");
+    return readScene(top, origin, baseScene);
 }
 
 datasets::Scene namedScene(const std::string& what, const std::filesystem::path& origin)
