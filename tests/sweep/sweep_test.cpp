@@ -406,6 +406,21 @@ TEST(CaseRunner, TheForceOfAPressIsThatOfTheTissueAndNotWhatTheHandGets)
     }
 }
 
+// K d^2 / 2: 50 N/m, 10 mm deep. The speed is no part of it.
+TEST(CaseRunner, TheWorkOfAPressOnASpringIsItsEnergyAtAnySpeed)
+{
+    const SweepPlan plan = parsePlan(
+        "scene = \"block\"\noutputs = [\"work_mj\"]\n"
+        "[[axis]]\nkey = \"procedure.speed_mm_s\"\nvalues = [10, 100, 300]\n"
+        "[procedure]\nkind = \"press\"\ndepth_mm = 10\nhold_ms = 60\n"
+        "[set]\nvolume.voxel_mm = 4\nmodel.level = \"spring\"\nmodel.stiffness_n_m = 50\n",
+        "plan.toml", namedScene);
+    CaseRunner runner(plan, "test");
+    for (const std::size_t i : {0U, 1U, 2U}) {
+        EXPECT_NEAR(runner.run(i).outputs[0], 2.5, 0.02) << i;
+    }
+}
+
 // A late force is felt late: the same hand, another session.
 TEST(CaseRunner, DelayChangesASession)
 {
