@@ -476,15 +476,5 @@ TEST(SweepFolder, ADamagedCaseIsNamedWithItsKeyAndHasNoRow)
     }
 }
 
-TEST(SweepCase, ThatTakesTooLongIsGivenUpAndItsRowSaysSo)
-{
-    SweepPlan plan = planOf("case_limit_s = 0.001\n" + depths);
-    EXPECT_EQ(plan.caseLimit, 0.001);
-    CaseRunner runner(plan, "one");
-    EXPECT_NE(tests::errorOf([&] { runner.run(0); }).find("took over 0.001 s and was aborted"), std::string::npos);
-    plan.caseLimit = 3600;
-    EXPECT_FALSE(runner.run(0).outputs.empty());
-}
-
 }  // namespace
 }  // namespace palpate::sweep
