@@ -30,7 +30,7 @@ struct Axis {
     std::string name;              // of its column
     std::string key;               // with dots; empty: none
     std::vector<KeyValue> values;  // a list; empty: a range
-    double low = 0, high = 0;      // of a range, both included
+    double low = 0, high = 0;      // of a range, both included; of whole numbers the first and the last one
     std::size_t steps = 0;         // of a range in a grid
     bool log = false;              // even in the logarithm
     bool whole = false;            // whole numbers only

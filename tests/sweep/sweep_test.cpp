@@ -137,12 +137,22 @@ TEST(SweepPlan, FormulasRangesAndConstraints)
     EXPECT_EQ(points, expected);
 }
 
+std::string axesOf(int count)
+{
+    std::string out;
+    for (int i = 0; i < count; ++i) {
+        out += "[[axis]]\nname = \"a" + std::to_string(i) + "\"\nrange = [0, 1]\n";
+    }
+    return out;
+}
+
 TEST(SweepPlan, RefusesWhatCannotBe)
 {
     const std::string scene = "scene = \"block\"\n";
     const auto axis = [](const std::string& key, const std::string& values) {
         return "[[axis]]\nkey = \"" + key + "\"\nvalues = " + values + "\n";
     };
+    const std::string range = "[[axis]]\nkey = \"dffb.gain\"\nrange = [0, 1]\n";
     const std::vector<std::pair<std::string, std::string>> wrong{
         {"[[axis]]\nname = \"a\"\nvalues = [1]\n", "scene is missing"},
         {scene, "[[axis]] is missing"},
@@ -199,6 +209,20 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n_change_pct\"\n"
                  "values = [1]\n[reference]\ndffb.gain = 0\n",
          "an output of the procedure and axis 'force_n_change_pct' alike"},
+        {scene + "outputs = [\"q =\"]\n" + axis("dffb.gain", "[1]"),
+         "plan.toml:2: outputs = [\"q =\"]: 'q =': there is no formula after the ="},
+        {scene + "[design]\nkind = \"sobol\"\nsamples = 4\n" + range + "steps = 3\n", "steps = 3: only a grid has them"},
+        {scene + range + "whole = true\nsteps = 3\n", "two of them would be the whole number 1: take fewer"},
+        {scene + "[[axis]]\nname = \"n\"\nlog_range = [1, 10]\nwhole = true\nsteps = 8\n",
+         "the whole number 1: take fewer"},
+        {scene + "[[axis]]\nname = \"n\"\nrange = [2.1, 2.9]\nwhole = true\nsteps = 2\n", "there is no whole number in it"},
+        {scene + "repeats = 4\n[design]\nkind = \"saltelli\"\nsamples = 1000000\n" + range,
+         "plan.toml:2: repeats = 4: 12000000 cases: 10000000 at most"},
+        {scene + "repeats = 11\n[design]\nkind = \"sobol\"\nsamples = 1000000\n" + range, "11000000 cases"},
+        {scene + "[design]\nkind = \"saltelli\"\nsamples = 1000000\n" + axesOf(9), "design of 11000000 points: 10000000"},
+        {scene + "[design]\nkind = \"morris\"\nsamples = 1000000\n" + axesOf(10), "a design of 11000000 points"},
+        {scene + "[design]\nkind = \"sobol\"\nsamples = 2\n" + axesOf(3668), "3668 axes: 3667 at most for this design"},
+        {scene + "[design]\nkind = \"saltelli\"\nsamples = 2\n" + axesOf(1834), "1834 axes: 1833 at most"},
     };
     for (const auto& [text, hint] : wrong) {
         const std::string error = refusal(text);
@@ -254,11 +278,12 @@ TEST(SweepPlan, TriesTissuesOfVolumesAndReferences)
     }
 }
 
-// Each whole number has an equal part of the samples: of 60 strata 20. Rounding gave the ends half of the others' share.
-// A grid has both ends and rounds between them, as before.
-TEST(SweepPlan, WholeNumbersAreSampledAlike)
+// Each whole number of the range, and no other, has an equal part of the samples: of 60 strata 20. Rounding gave the ends
+// half of the others' share, and 6 for 5.6. A grid has both ends and rounds between them.
+TEST(SweepPlan, WholeNumbersAreSampledAlikeAndInTheRange)
 {
-    const std::string axis = "[[axis]]\nname = \"k\"\nwhole = true\nrange = [-1, 1]\n";
+    const std::string axis = "[[axis]]\nname = \"k\"\nwhole = true\n";
+    const std::string samples = "[design]\nkind = \"latin_hypercube\"\nsamples = 60\n";
     const auto counts = [](const SweepPlan& plan) {
         std::map<double, int> out;
         for (std::size_t i = 0; i < plan.cases(); ++i) {
@@ -266,9 +291,12 @@ TEST(SweepPlan, WholeNumbersAreSampledAlike)
         }
         return out;
     };
-    EXPECT_EQ(counts(planOf("[design]\nkind = \"latin_hypercube\"\nsamples = 60\n" + axis)),
-              (std::map<double, int>{{-1, 20}, {0, 20}, {1, 20}}));
-    EXPECT_EQ(counts(planOf(axis + "steps = 5\n")), (std::map<double, int>{{-1, 2}, {0, 1}, {1, 2}}));
+    EXPECT_EQ(counts(planOf(samples + axis + "range = [-1, 1]\n")), (std::map<double, int>{{-1, 20}, {0, 20}, {1, 20}}));
+    EXPECT_EQ(counts(planOf(samples + axis + "range = [2.6, 5.6]\n")), (std::map<double, int>{{3, 20}, {4, 20}, {5, 20}}));
+    EXPECT_EQ(counts(planOf(samples + axis + "log_range = [2.6, 4.6]\n")).size(), 2U) << "3 and 4";
+    EXPECT_EQ(counts(planOf(samples + axis + "range = [2.6, 3.4]\n")), (std::map<double, int>{{3, 60}}));
+    EXPECT_EQ(counts(planOf(axis + "range = [2.6, 5.6]\nsteps = 3\n")), (std::map<double, int>{{3, 1}, {4, 1}, {5, 1}}));
+    EXPECT_EQ(counts(planOf(axis + "range = [1, 4]\nsteps = 3\n")), (std::map<double, int>{{1, 1}, {3, 1}, {4, 1}}));
 }
 
 TEST(SweepPlan, ReadyPlansAreWhole)
