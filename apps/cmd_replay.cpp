@@ -47,11 +47,11 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
     }
     if (!result.identical) {
         const bool forces = result.largestDifference > 0;
-        faults.push_back(
-            fmt::format("{} from tick {} on: the record was made by another build ({}) or machine, or was changed: {}",
-                        forces ? fmt::format("forces differ, by up to {:.3g} N,", result.largestDifference)
-                               : "what was recorded differs",
-                        *result.firstDifference, record.info().build, result.inWords));
+        faults.push_back(fmt::format("{} from tick {} on: {}: {}",
+                                     forces ? fmt::format("forces differ, by up to {:.3g} N,", result.largestDifference)
+                                            : "what was recorded differs",
+                                     *result.firstDifference, haptics::whyItDiffers(record, base::build()),
+                                     result.inWords));
     }
     for (const auto& [key, value] : record.results()) {
         if (key == "force_hash" && value != session::hexadecimal(result.forceHash)) {
