@@ -137,6 +137,17 @@ TEST(SweepPlan, FormulasRangesAndConstraints)
     EXPECT_EQ(points, expected);
 }
 
+// Each text is refused on one line that names the file and holds the hint.
+void expectRefused(const std::vector<std::pair<std::string, std::string>>& wrong)
+{
+    for (const auto& [text, hint] : wrong) {
+        const std::string error = refusal(text);
+        EXPECT_NE(error.find(hint), std::string::npos) << text << "\n  gives: " << error;
+        EXPECT_TRUE(error.starts_with("plan.toml")) << error;
+        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+}
+
 std::string axesOf(int count)
 {
     std::string out;
@@ -152,7 +163,6 @@ TEST(SweepPlan, RefusesWhatCannotBe)
     const auto axis = [](const std::string& key, const std::string& values) {
         return "[[axis]]\nkey = \"" + key + "\"\nvalues = " + values + "\n";
     };
-    const std::string range = "[[axis]]\nkey = \"dffb.gain\"\nrange = [0, 1]\n";
     const std::vector<std::pair<std::string, std::string>> wrong{
         {"[[axis]]\nname = \"a\"\nvalues = [1]\n", "scene is missing"},
         {scene, "[[axis]] is missing"},
@@ -209,7 +219,15 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "outputs = [\"work_mj\"]\n[procedure]\nkind = \"press\"\n[[axis]]\nname = \"force_n_change_pct\"\n"
                  "values = [1]\n[reference]\ndffb.gain = 0\n",
          "an output of the procedure and axis 'force_n_change_pct' alike"},
-        {scene + "outputs = [\"q =\"]\n" + axis("dffb.gain", "[1]"),
+    };
+    expectRefused(wrong);
+}
+
+TEST(SweepPlan, RefusesDesignsThatCannotBe)
+{
+    const std::string scene = "scene = \"block\"\n", range = "[[axis]]\nkey = \"dffb.gain\"\nrange = [0, 1]\n";
+    expectRefused({
+        {scene + "outputs = [\"q =\"]\n" + range + "steps = 2\n",
          "plan.toml:2: outputs = [\"q =\"]: 'q =': there is no formula after the ="},
         {scene + "[design]\nkind = \"sobol\"\nsamples = 4\n" + range + "steps = 3\n", "steps = 3: only a grid has them"},
         {scene + range + "whole = true\nsteps = 3\n", "two of them would be the whole number 1: take fewer"},
@@ -223,13 +241,7 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "[design]\nkind = \"morris\"\nsamples = 1000000\n" + axesOf(10), "a design of 11000000 points"},
         {scene + "[design]\nkind = \"sobol\"\nsamples = 2\n" + axesOf(3668), "3668 axes: 3667 at most for this design"},
         {scene + "[design]\nkind = \"saltelli\"\nsamples = 2\n" + axesOf(1834), "1834 axes: 1833 at most"},
-    };
-    for (const auto& [text, hint] : wrong) {
-        const std::string error = refusal(text);
-        EXPECT_NE(error.find(hint), std::string::npos) << text << "\n  gives: " << error;
-        EXPECT_TRUE(error.starts_with("plan.toml")) << error;
-        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
-    }
+    });
 }
 
 // What formulas cannot mix up is let through: a word that comes twice, and what only another procedure measures.
