@@ -162,7 +162,7 @@ struct ReplayPlayer::Impl {
                                 : base::marked("THE RECORD SAYS SOMETHING ELSE"),
                           fmt::format("{}: {} from tick {} on: {}: {}", file,
                                       force ? "forces differ" : "what was recorded differs", then.tick,
-                                      haptics::whyItDiffers(record, base::build()), comparison.inWords()));
+                                      haptics::whyItDiffers(file, base::build()), comparison.inWords()));
                 }
                 noteMoments(now);
                 showTick(now, timing, state);

@@ -70,8 +70,8 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
         const haptics::TickRecord& now = simulation.tick(then.device);
         const bool same = comparison.add(then, now);
         if (!same) {
-            throw base::error("{}: differs from tick {} on: {}: {}", file, next,
-                              haptics::whyItDiffers(record, base::build()), comparison.inWords());
+            throw base::error("{}: differs from tick {} on: {}: {}", file, next, haptics::whyItDiffers(file, base::build()),
+                              comparison.inWords());
         }
         if (each) {
             each(now);
