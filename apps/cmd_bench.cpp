@@ -67,9 +67,6 @@ void benchTick(const BenchArguments& o)
 {
     base::checkOutput(o.json);
     const bool tell = o.json != "-";
-    if (tell) {
-        printHead();
-    }
     auto cases = nlohmann::json::array();
     double first = 0.0;
     double most = 0.0;
@@ -77,6 +74,9 @@ void benchTick(const BenchArguments& o)
         auto changes = o.changes;
         changes.voxelsPerSide = side;
         const auto model = session::openSession(o.scene, changes);
+        if (tell && cases.empty()) {
+            printHead();
+        }
         const auto result = studies::benchTick(model, {o.paced, 0.0});
         if (tell) {
             printCase(side, result);

@@ -39,7 +39,8 @@ nlohmann::json differenceFigures(const haptics::ReplayResult& result)
 }
 
 // What is wrong with the record, beside what its format and its build have to do with it; empty: nothing.
-std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult& result, const haptics::RecordCheck& check)
+std::string faultsOf(const std::string& file, const haptics::Record& record, const haptics::ReplayResult& result,
+                     const haptics::RecordCheck& check)
 {
     std::vector<std::string> faults;
     if (check.seal.state == haptics::Seal::State::broken) {
@@ -47,11 +48,10 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
     }
     if (!result.identical) {
         const bool forces = result.largestDifference > 0;
-        faults.push_back(
-            fmt::format("{} from tick {} on: the record was made by another build ({}) or machine, or was changed: {}",
-                        forces ? fmt::format("forces differ, by up to {:.3g} N,", result.largestDifference)
-                               : "what was recorded differs",
-                        *result.firstDifference, record.info().build, result.inWords));
+        faults.push_back(fmt::format("{} from tick {} on: {}: {}",
+                                     forces ? fmt::format("forces differ, by up to {:.3g} N,", result.largestDifference)
+                                            : "what was recorded differs",
+                                     *result.firstDifference, haptics::whyItDiffers(file, base::build()), result.inWords));
     }
     for (const auto& [key, value] : record.results()) {
         if (key == "force_hash" && value != session::hexadecimal(result.forceHash)) {
@@ -69,7 +69,7 @@ void replayRecord(const ReplayArguments& o)
     const auto model = session::reopenSession(o.file, record.info());
     const auto result = haptics::replay(record, model);
     const auto check = haptics::checkRecord(record, base::build());
-    const std::string faults = faultsOf(record, result, check);
+    const std::string faults = faultsOf(o.file, record, result, check);
 
     nlohmann::json figures{{"ticks", result.ticks},
                            {"identical", result.identical},

@@ -1,9 +1,11 @@
 #include <apps/replay_player.h>
 
+#include <base/build.h>
 #include <base/error.h>
 #include <base/words.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
+#include <haptics/record_check.h>
 #include <haptics/replay.h>
 #include <haptics/simulation.h>
 #include <render/events.h>
@@ -158,10 +160,9 @@ struct ReplayPlayer::Impl {
                     const bool force = now.total != then.total;
                     blame(force ? base::marked("FORCES ARE NOT THOSE OF THE RECORD")
                                 : base::marked("THE RECORD SAYS SOMETHING ELSE"),
-                          fmt::format("{}: {} from tick {} on: the record was made by another build or method ({}), or was "
-                                      "changed: {}",
-                                      file, force ? "forces differ" : "what was recorded differs", then.tick,
-                                      record.info().build, comparison.inWords()));
+                          fmt::format("{}: {} from tick {} on: {}: {}", file,
+                                      force ? "forces differ" : "what was recorded differs", then.tick,
+                                      haptics::whyItDiffers(file, base::build()), comparison.inWords()));
                 }
                 noteMoments(now);
                 showTick(now, timing, state);

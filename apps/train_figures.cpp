@@ -25,11 +25,23 @@ std::string missesInWords(const haptics::ServoTiming& timing)
                        timing.overruns);
 }
 
+// "4509 ticks, 2 missed in 1 gaps of ..; a tick takes 210 us (p50), ..; late by .."
+std::string timingInWords(const haptics::ServoTiming& timing)
+{
+    const auto tick = timing.work.percentiles(), late = timing.lateness.percentiles();
+    const std::string work = fmt::format("a tick takes {:.0f} us (p50), {:.0f} us (p99)", 1e6 * tick.p50, 1e6 * tick.p99);
+    if (!timing.paced) {
+        return fmt::format("{} ticks, not paced; {}", timing.ticks, work);
+    }
+    return fmt::format("{} ticks, {} missed{}; {}; late by {:.1f} us (p50), {:.0f} us (p99)", timing.ticks, timing.missed,
+                       missesInWords(timing), work, 1e6 * late.p50, 1e6 * late.p99);
+}
+
 // What to do about a machine that is too slow for the tissue model, or nothing.
 std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model, const std::string& next)
 {
     const double overruns = session::overrunsOf(timing);
-    if (overruns <= session::bearableOverruns) {
+    if (!timing.paced || overruns <= session::bearableOverruns) {
         return "";
     }
     const bool coarser =
@@ -109,12 +121,7 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
 void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model,
                const std::string& next)
 {
-    const auto tick = result.timing.work.percentiles();
-    const auto late = result.timing.lateness.percentiles();
-    fmt::print(
-        "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
-        result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
-        1e6 * late.p50, 1e6 * late.p99);
+    fmt::print("{}\n", timingInWords(result.timing));
     fmt::print("{}", slowness(result.timing, model.scene.model, next));
     if (model.posture) {
         fmt::print("gravity: {}\n", haptics::textOf(*model.posture));

@@ -93,6 +93,15 @@ std::string someOf(const std::vector<std::string>& parts, std::size_t most)
     return parts.size() > most ? fmt::format("{}; and {} more", text, parts.size() - most) : text;
 }
 
+std::string whyItDiffers(const std::filesystem::path& file, std::string_view build)
+{
+    const Record record(file);
+    const std::string made = record.info().build;
+    return record.seal().state == Seal::State::broken ? "the record was changed after it was closed"
+           : made == build                            ? "the record was made by another machine, or was changed"
+                           : fmt::format("the record was made by another build ({}) or machine, or was changed", made);
+}
+
 RecordCheck checkRecord(const Record& record, std::string_view build)
 {
     RecordCheck check;

@@ -2,6 +2,7 @@
 
 #include <haptics/recorder.h>
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,6 +20,12 @@ struct RecordCheck {
 /// replay() does. Throws std::runtime_error for a file that is no record.
 /// @param build  this program's, see base::build()
 RecordCheck checkRecord(const Record& record, std::string_view build);
+
+/// Why what is computed from a record's poses differs from what it says: "the record was made by another build (X) or
+/// machine, or was changed". Another build only where it was one; where the seal is broken, that it was changed alone.
+/// Opens the file anew: whoever asks may just be reading it.
+/// @param build  this program's, see base::build()
+std::string whyItDiffers(const std::filesystem::path& file, std::string_view build);
 
 /// The first `most` of `parts`, separated by semicolons, and how many more there are.
 std::string someOf(const std::vector<std::string>& parts, std::size_t most = 4);

@@ -250,9 +250,8 @@ void Scorer::add(const TickRecord& record) noexcept
         jerk_.pause();
     } else {
         jerk_.add(hand, rate_);
-        // The force on the hand is what the tissue pushes back with.
-        score_.tissueWork -= ticks_ > 0 ? glm::dot(record.basic, hand - hand_) : 0.0;
     }
+    addWork(record);
     ++ticks_;
     addMark(record);
     score_.peakForce = std::max(score_.peakForce, glm::length(record.total));
@@ -408,6 +407,15 @@ void Scorer::addFiring(const TickRecord& record) noexcept
         score_.bestTargetFraction = fraction;
         score_.bestTargetLength = length;
     }
+}
+
+// The force on the hand is what the tissue pushes back with; over a step it is the mean of both ends. That of one end would
+// count a part of every movement, and so of a tremor, as work.
+void Scorer::addWork(const TickRecord& record) noexcept
+{
+    const Vec3 force = record.phase == Phase::free ? Vec3(0.0) : record.basic;
+    score_.tissueWork -= ticks_ > 0 ? 0.5 * glm::dot(force_ + force, record.device.position - hand_) : 0.0;
+    force_ = force;
 }
 
 void Scorer::addMark(const TickRecord& record) noexcept

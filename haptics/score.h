@@ -170,6 +170,7 @@ private:
     void addBeyond(const TickRecord& record) noexcept;
     void addFiring(const TickRecord& record) noexcept;
     void addVital(const TickRecord& record) noexcept;
+    void addWork(const TickRecord& record) noexcept;
     void addMark(const TickRecord& record) noexcept;
     void judgeMarks(Score& score) const noexcept;
     void addPicture(const TickRecord& record) noexcept;
@@ -182,6 +183,7 @@ private:
     Score score_;
     PathMeter path_, insidePath_;
     Vec3 hand_{0.0}, tip_{0.0};  // of the last tick [m]
+    Vec3 force_{0.0};            // of the tissue on the hand, at the last tick [N]
     std::uint64_t ticks_ = 0, lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
     std::uint64_t contactTicks_ = 0, restTicks_ = 0, vitalTicks_ = 0;
     double forceSum_ = 0;                     // [N]

@@ -160,6 +160,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
                      const std::atomic<bool>& stop)
 {
     ServoTiming timing;
+    timing.paced = options.paced;
     Punctuality periods(timing);
     Overload overload(options.lateAllowed);
     Pause pause(options.pause, options.paced);
@@ -178,10 +179,10 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
         stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
         addWork(timing, record, sent - start);
+        timing.overruns += sent - start > period ? 1 : 0;
         if (options.paced) {
             timing.lateness.add(seconds(start - due));
             due += period;
-            timing.overruns += sent - start > period ? 1 : 0;
             periods.add(sent > due);
             overload.add(sent > due);
         }

@@ -37,6 +37,7 @@ private:
 
 /// How the servo loop kept time.
 struct ServoTiming {
+    bool paced = false;                      // against the clock; else lateness, missed ticks and gaps are not measured
     Histogram lateness;                      // start of a tick after its due time
     Histogram work;                          // a tick, H2 to H5
     std::array<Histogram, taskCount> tasks;  // by haptics::Task

@@ -1,7 +1,9 @@
 #include <session/deformed_state.h>
 
+#include <base/build.h>
 #include <base/error.h>
 #include <haptics/broadcast.h>
+#include <haptics/record_check.h>
 #include <haptics/replay.h>
 #include <session/open.h>
 
@@ -100,9 +102,10 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
                      file, next);
         const haptics::TickRecord& now = simulation.tick(then.device);
         const bool same = comparison.add(then, now);
-        base::failIf(
-            !same, "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was changed: {}",
-            file, next, record.info().build, comparison.inWords());
+        if (!same) {
+            throw base::error("{}: differs from tick {} on: {}: {}", file, next, haptics::whyItDiffers(file, base::build()),
+                              comparison.inWords());
+        }
         if (each) {
             each(now);
         }

@@ -7,6 +7,8 @@
 
 #include <sys/resource.h>
 
+#include <utility>
+
 namespace palpate::session {
 
 nlohmann::json microseconds(const haptics::Percentiles& p)
@@ -20,12 +22,17 @@ nlohmann::json timingFigures(const haptics::ServoTiming& timing)
     for (std::size_t i = 0; i < haptics::taskCount; ++i) {
         tasks[std::string(name(static_cast<haptics::Task>(i)))] = microseconds(timing.tasks[i].percentiles());
     }
+    const auto measured = [&](nlohmann::json value) { return timing.paced ? std::move(value) : nlohmann::json(); };
+    nlohmann::json lateness = microseconds(timing.lateness.percentiles());
+    for (auto& value : lateness) {
+        value = measured(value);
+    }
     return {{"ticks", timing.ticks},
-            {"missed_ticks", timing.missed},
+            {"missed_ticks", measured(timing.missed)},
             {"overruns", timing.overruns},
-            {"gaps", timing.gaps},
-            {"longest_gap_ms", 1e3 * haptics::tickSeconds * static_cast<double>(timing.longestGap)},
-            {"lateness_us", microseconds(timing.lateness.percentiles())},
+            {"gaps", measured(timing.gaps)},
+            {"longest_gap_ms", measured(1e3 * haptics::tickSeconds * static_cast<double>(timing.longestGap))},
+            {"lateness_us", std::move(lateness)},
             {"tick_us", microseconds(timing.work.percentiles())},
             {"tasks_us", tasks}};
 }

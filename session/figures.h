@@ -16,6 +16,7 @@ namespace palpate::session {
 nlohmann::json microseconds(const haptics::Percentiles& p);
 
 /// Lateness, work and tasks of a servo loop as `train` and `bench tick` give them: lateness_us, tick_us, tasks_us{H2..H7}.
+/// Null where a loop that kept no clock did not measure it.
 nlohmann::json timingFigures(const haptics::ServoTiming& timing);
 
 /// Cores as `train` gives them: core[]{fraction{tissue:..}, target_fraction, length_in_lesion_mm, fragments, volume_mm3}.

@@ -232,7 +232,8 @@ std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene&
     const double overruns = overrunsOf(timing);
     const auto settings = datasets::elasticSettings();
     const auto at = std::find(settings.begin(), settings.end(), scene.model.setting);
-    if (timing.ticks < fewestTicks || overruns <= bearableOverruns || at == settings.begin() || at == settings.end()) {
+    if (!timing.paced || timing.ticks < fewestTicks || overruns <= bearableOverruns || at == settings.begin() ||
+        at == settings.end()) {
         return "";
     }
     const FittingSetting next{

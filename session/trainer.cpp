@@ -14,7 +14,10 @@
 #include <atomic>
 #include <chrono>
 #include <optional>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 namespace palpate::session {
 
@@ -80,6 +83,32 @@ std::string steppedDown(const SessionFigures& figures)
         figures.level == datasets::ModelLevel::elastic ? "elastic with smaller windows" : name(figures.level));
 }
 
+// What the record says of the session beside its ticks; empty where a session that keeps no clock has not measured it.
+std::vector<std::pair<std::string, std::string>> resultsOf(const TrainResult& result)
+{
+    const ServoTiming& timing = result.timing;
+    const auto late = timing.lateness.percentiles();
+    const auto work = timing.work.percentiles();
+    const auto measured = [&](std::string value) { return timing.paced ? std::move(value) : std::string(); };
+    const auto microseconds = [](double seconds) { return fmt::format("{:.2f}", 1e6 * seconds); };
+    return {{"missed_ticks", measured(fmt::format("{}", timing.missed))},
+            {"overruns", fmt::format("{}", timing.overruns)},
+            {"gaps", measured(fmt::format("{}", timing.gaps))},
+            {"longest_gap_ms", measured(fmt::format("{}", timing.longestGap))},
+            {"tick_us_p50", microseconds(work.p50)},
+            {"tick_us_p99", microseconds(work.p99)},
+            {"lateness_us_p50", measured(microseconds(late.p50))},
+            {"lateness_us_p99", measured(microseconds(late.p99))},
+            {"lateness_us_p999", measured(microseconds(late.p999))},
+            {"lateness_us_max", measured(microseconds(late.max))},
+            {"pauses", fmt::format("{}", timing.pauses)},
+            {"paused_s", fmt::format("{:.3f}", timing.paused)},
+            {"force_hash", fmt::format("{:016x}", result.forceHash)},
+            {"steps_down", fmt::format("{}", result.stepsDown)},
+            {"model_at_end", std::string(name(result.level))},
+            {"score_total", fmt::format("{:.1f}", result.score.total)}};
+}
+
 }  // namespace
 
 struct Trainer::Impl {
@@ -140,22 +169,7 @@ struct Trainer::Impl {
     void conclude(TrainResult& result)
     {
         if (recorder) {
-            const auto late = result.timing.lateness.percentiles();
-            const auto work = result.timing.work.percentiles();
-            recorder->finish({{"missed_ticks", fmt::format("{}", result.timing.missed)},
-                              {"overruns", fmt::format("{}", result.timing.overruns)},
-                              {"gaps", fmt::format("{}", result.timing.gaps)},
-                              {"longest_gap_ms", fmt::format("{}", result.timing.longestGap)},
-                              {"tick_us_p50", fmt::format("{:.2f}", 1e6 * work.p50)},
-                              {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
-                              {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
-                              {"lateness_us_p99", fmt::format("{:.2f}", 1e6 * late.p99)},
-                              {"pauses", fmt::format("{}", result.timing.pauses)},
-                              {"paused_s", fmt::format("{:.3f}", result.timing.paused)},
-                              {"force_hash", fmt::format("{:016x}", result.forceHash)},
-                              {"steps_down", fmt::format("{}", result.stepsDown)},
-                              {"model_at_end", std::string(name(result.level))},
-                              {"score_total", fmt::format("{:.1f}", result.score.total)}});
+            recorder->finish(resultsOf(result));
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();
             result.recordCut = !recorder->whole();

@@ -4,6 +4,7 @@
 #include <haptics/session_model.h>
 #include <sweep/plan.h>
 
+#include <chrono>
 #include <filesystem>
 #include <list>
 #include <memory>
@@ -57,6 +58,7 @@ private:
 
     const SweepPlan& plan_;
     std::string build_;
+    std::chrono::steady_clock::time_point began_;  // of the case: its models and its reference are parts of it
     // By the text that they follow from, the last used first.
     std::list<std::pair<std::string, std::shared_ptr<const Modelled>>> models_;
     std::list<std::pair<std::string, std::shared_ptr<const volume::Tissue>>> volumes_;

@@ -270,8 +270,7 @@ KeyValue Axis::at(double unit) const
     }
     if (whole && !log) {
         // Rounding would give the ends half the share of the others.
-        const double first = std::round(low), last = std::round(high);
-        return static_cast<std::int64_t>(std::min(last, first + std::floor(unit * (last - first + 1))));
+        return static_cast<std::int64_t>(std::min(high, low + std::floor(unit * (high - low + 1))));
     }
     return inRange(*this, unit);
 }
@@ -293,6 +292,9 @@ double Axis::placeAt(double unit) const
     }
     if (!whole) {
         return unit;
+    }
+    if (low >= high) {
+        return 0.0;
     }
     const double value = *numberOf(at(unit));
     const double place = log ? std::log(value / low) / std::log(high / low) : (value - low) / (high - low);

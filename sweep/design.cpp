@@ -66,6 +66,7 @@ UnitPoints latinHypercube(std::size_t samples, std::size_t axes, std::uint64_t s
 
 UnitPoints sobolPoints(std::size_t samples, std::size_t axes, std::uint64_t seed)
 {
+    static_assert(maxSobolAxes == boost::random::default_sobol_table::max_dimension);
     boost::random::sobol engine(axes);
     std::uint64_t state = seed;
     std::vector<std::uint64_t> shift(axes);

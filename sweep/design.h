@@ -20,12 +20,16 @@ using UnitPoints = std::vector<std::vector<double>>;
 /// One point in each of `samples` strata of every axis (McKay, Beckman and Conover 1979).
 UnitPoints latinHypercube(std::size_t samples, std::size_t axes, std::uint64_t seed);
 
+/// Columns that Sobol's sequence has numbers for (Joe and Kuo 2008).
+inline constexpr std::size_t maxSobolAxes = 3667;
+
 /// The first points of Sobol's sequence with a digital shift by the seed: of the first 2^m points each interval
 /// [k, k + 1) / 2^m of every axis holds one.
+/// @pre  no more than `maxSobolAxes` axes
 UnitPoints sobolPoints(std::size_t samples, std::size_t axes, std::uint64_t seed);
 
 /// For each of `samples` pairs of points a, b: a, b, and for each axis i the point a with b's coordinate i (Saltelli 2010).
-/// samples x (axes + 2) points.
+/// samples x (axes + 2) points, of 2 x axes columns of Sobol's sequence.
 UnitPoints saltelliPoints(std::size_t samples, std::size_t axes, std::uint64_t seed);
 
 /// `samples` trajectories of axes + 1 points; from one to the next one axis moves by `morrisStep`, each once (Morris 1991).

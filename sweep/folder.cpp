@@ -71,6 +71,15 @@ datasets::Scene sceneOfFolder(const std::string&, const fs::path& origin)
     return datasets::parseScene(textOf(file), file);
 }
 
+// Whether scenes say the same. Both are written and read alike: one comes from a file that was, maybe by another build.
+bool areAlike(const datasets::Scene& a, const datasets::Scene& b)
+{
+    const auto again = [](const datasets::Scene& s) {
+        return datasets::sceneText(datasets::parseScene(datasets::sceneText(s), "scene.toml"));
+    };
+    return datasets::sceneText(a) == datasets::sceneText(b) || again(a) == again(b);
+}
+
 double cpuSeconds()
 {
     timespec t{};
@@ -183,6 +192,16 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         !given.empty() && text.first != plan_.text,
         "{}: holds another plan than {}: choose another folder, or leave out the plan to resume that of the folder",
         folder_.native(), given);
+    checkFiles();
+    base::failIf(
+        !given.empty() && !areAlike(plan_.base, sceneOfPlan(text.first, text.second, namedScene)),
+        "{}: its cases are of another scene than {} has now: choose another folder, or leave out the plan to resume "
+        "with the scene of the folder",
+        folder_.native(), given);
+}
+
+void SweepFolder::checkFiles()
+{
     const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
     base::failIf(!about.is_object(), "{}/sweep.json: is damaged: begin in another folder", folder_.native());
     const json own = ownOf(plan_.text, textOf(folder_ / "scene.toml"));

@@ -67,6 +67,8 @@ public:
 private:
     std::filesystem::path caseFile(std::size_t index) const;
     void begin();
+    // That plan, scene and what the scene reads are those that the cases are of; takes in the sweep's name.
+    void checkFiles();
 
     std::filesystem::path folder_;
     SweepPlan plan_;

@@ -2,6 +2,7 @@
 
 #include <base/error.h>
 #include <base/mapped.h>
+#include <base/split.h>
 #include <datasets/embedded.h>
 #include <datasets/scene_text.h>
 #include <datasets/toml_section.h>
@@ -60,6 +61,25 @@ void readRange(Section& section, std::string_view key, Axis& axis)
     axis.low = *number(0);
     axis.high = *number(1);
     section.refuseIf(axis.log && axis.low <= 0, key, "a logarithmic range must be above 0");
+    if (axis.whole) {
+        axis.low = std::ceil(axis.low);
+        axis.high = std::floor(axis.high);
+        section.refuseIf(axis.low > axis.high, key, "there is no whole number in it");
+    }
+}
+
+void readSteps(Section& section, DesignKind design, Axis& axis)
+{
+    const auto steps = section.integer("steps", "", 2, maxSteps);
+    const bool isGrid = design == DesignKind::grid;
+    section.missingIf(!steps && isGrid, "steps", "how many values of the range a grid has");
+    section.refuseIf(steps && !isGrid, "steps", "only a grid has them: leave it out");
+    axis.steps = static_cast<std::size_t>(steps.value_or(0));
+    for (std::size_t i = 1; axis.whole && i < axis.steps; ++i) {
+        const KeyValue level = axis.level(i);
+        section.refuseIf(level == axis.level(i - 1), "steps",
+                         fmt::format("two of them would be the whole number {}: take fewer", toText(level)));
+    }
 }
 
 void readValues(Section& section, Axis& axis)
@@ -88,11 +108,9 @@ Axis readAxis(Section& section, DesignKind design)
         readValues(section, axis);
     } else {
         axis.log = section.has("log_range");
-        readRange(section, axis.log ? "log_range" : "range", axis);
         axis.whole = section.flag("whole").value_or(false);
-        const auto steps = section.integer("steps", "", 2, maxSteps);
-        section.missingIf(!steps && design == DesignKind::grid, "steps", "how many values of the range a grid has");
-        axis.steps = static_cast<std::size_t>(steps.value_or(0));
+        readRange(section, axis.log ? "log_range" : "range", axis);
+        readSteps(section, design, axis);
     }
     section.finish();
     return axis;
@@ -120,6 +138,13 @@ std::vector<Setting> readSettings(Section& top, std::string_view key)
         flatten(top, key, *node->as_table(), "", out);
     }
     return out;
+}
+
+datasets::Scene readScene(Section& top, const std::filesystem::path& origin, SceneSource baseScene)
+{
+    const auto scene = top.word("scene");
+    top.missingIf(!scene, "scene", "a built-in scene, a scene file or a volume");
+    return baseScene(*scene, origin);
 }
 
 void readDesign(Section& top, SweepPlan& plan)
@@ -207,6 +232,8 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
             word.substr(0, word.find_last_not_of(' ', equals == std::string::npos ? equals : equals - 1) + 1), {}};
         if (equals != std::string::npos) {
             output.formula = word.substr(equals + 1);
+            top.refuseIf(base::trimmed(output.formula).empty(), "outputs",
+                         fmt::format("'{}': there is no formula after the =", word));
         } else if (!there.contains(output.name)) {
             top.refuse("outputs", fmt::format("there is no {}; there are {}", output.name, fmt::join(there, ", ")));
         }
@@ -216,15 +243,52 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
     }
 }
 
-UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
+void checkCases(double points, const SweepPlan& plan, Section& top)
 {
+    const double cases = points * static_cast<double>(plan.repeats);
+    top.refuseIf(cases > static_cast<double>(maxCases), "repeats",
+                 fmt::format("{:.0f} cases: {} at most", cases, maxCases));
+}
+
+// So many points take memory and time; `points` may be more than a std::size_t holds.
+void checkCount(double points, const SweepPlan& plan, Section& top)
+{
+    const bool isGrid = plan.design == DesignKind::grid;
+    top.refuseIf(points > static_cast<double>(maxCases), isGrid ? "axis" : "design",
+                 fmt::format("{} of {:.0f} points: {} at most; take {}", isGrid ? "a grid" : "a design", points, maxCases,
+                             isGrid ? "samples instead" : "fewer samples"));
+    if (plan.constraints.empty()) {
+        checkCases(points, plan, top);
+    }
+}
+
+// Before there are any, and before constraints.
+double countOf(const SweepPlan& plan)
+{
+    const auto samples = static_cast<double>(plan.samples), axes = static_cast<double>(plan.axes.size());
+    switch (plan.design) {
+        case DesignKind::latinHypercube:
+        case DesignKind::sobol:
+            return samples;
+        case DesignKind::saltelli:
+            return samples * (axes + 2);
+        case DesignKind::morris:
+            return samples * (axes + 1);
+        case DesignKind::list:
+            return static_cast<double>(plan.axes.front().values.size());
+        case DesignKind::grid:
+            break;
+    }
     double count = 1;
-    for (const Axis& a : axes) {
+    for (const Axis& a : plan.axes) {
         count *= static_cast<double>(a.levels());
     }
-    top.refuseIf(count > static_cast<double>(maxCases), "axis",
-                 fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, maxCases));
-    UnitPoints points(static_cast<std::size_t>(count), std::vector<double>(axes.size()));
+    return count;
+}
+
+UnitPoints gridPoints(const std::vector<Axis>& axes, std::size_t count)
+{
+    UnitPoints points(count, std::vector<double>(axes.size()));
     for (std::size_t i = 0; i < points.size(); ++i) {
         std::size_t rest = i;
         for (std::size_t a = axes.size(); a-- > 0;) {
@@ -253,6 +317,13 @@ UnitPoints listPoints(const std::vector<Axis>& axes, Section& top)
 
 UnitPoints pointsOf(const SweepPlan& plan, Section& top)
 {
+    const double count = countOf(plan);
+    checkCount(count, plan, top);
+    const std::size_t columns = plan.axes.size() * (plan.design == DesignKind::saltelli ? 2 : 1);
+    const bool ofSobol = plan.design == DesignKind::saltelli || plan.design == DesignKind::sobol;
+    top.refuseIf(
+        ofSobol && columns > maxSobolAxes, "axis",
+        fmt::format("{} axes: {} at most for this design", plan.axes.size(), maxSobolAxes * plan.axes.size() / columns));
     switch (plan.design) {
         case DesignKind::latinHypercube:
             return latinHypercube(plan.samples, plan.axes.size(), plan.seed);
@@ -267,7 +338,7 @@ UnitPoints pointsOf(const SweepPlan& plan, Section& top)
         case DesignKind::grid:
             break;
     }
-    return gridPoints(plan.axes, top);
+    return gridPoints(plan.axes, static_cast<std::size_t>(count));
 }
 
 // "depth_mm = 3, d = 10".
@@ -315,6 +386,7 @@ void applyConstraints(SweepPlan& plan, Section& top)
     }
     plan.points = std::move(kept);
     top.refuseIf(plan.points.empty(), "constraints", "no point is left");
+    checkCases(static_cast<double>(plan.points.size()), plan, top);
 }
 
 }  // namespace
@@ -327,9 +399,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.text = text;
     plan.name = top.word("name").value_or(origin.stem().string());
     plan.about = top.word("about").value_or("");
-    const auto scene = top.word("scene");
-    top.missingIf(!scene, "scene", "a built-in scene, a scene file or a volume");
-    plan.base = baseScene(*scene, origin);
+    plan.base = readScene(top, origin, baseScene);
     plan.seed =
         static_cast<std::uint64_t>(top.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
     plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, maxSamples).value_or(1));
@@ -357,12 +427,16 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     checkKeys(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);
-    top.refuseIf(
-        static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(maxCases),
-        "repeats", fmt::format("over {} cases", maxCases));
     probeCases(plan, origin.string());
     probeOutputs(plan, origin.string());
     return plan;
+}
+
+datasets::Scene sceneOfPlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene)
+{
+    const toml::table root = datasets::parseToml(text, origin.string());
+    Section top(root, origin.string(), "");
+    return readScene(top, origin, baseScene);
 }
 
 datasets::Scene namedScene(const std::string& what, const std::filesystem::path& origin)

@@ -30,7 +30,7 @@ struct Axis {
     std::string name;              // of its column
     std::string key;               // with dots; empty: none
     std::vector<KeyValue> values;  // a list; empty: a range
-    double low = 0, high = 0;      // of a range, both included
+    double low = 0, high = 0;      // of a range, both included; of whole numbers the first and the last one
     std::size_t steps = 0;         // of a range in a grid
     bool log = false;              // even in the logarithm
     bool whole = false;            // whole numbers only
@@ -106,6 +106,8 @@ struct SweepPlan {
 /// ("FILE:LINE: what is wrong"), also when a case's scene would be none.
 using SceneSource = datasets::Scene (*)(const std::string& what, const std::filesystem::path& origin);
 SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene);
+/// The scene that a plan names alone. Throws std::runtime_error.
+datasets::Scene sceneOfPlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene);
 /// A built-in scene by name, a scene (.toml) or a volume (.vdb) from the plan's folder.
 datasets::Scene namedScene(const std::string& what, const std::filesystem::path& origin);
 

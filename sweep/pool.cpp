@@ -35,6 +35,7 @@ constexpr std::size_t idle = static_cast<std::size_t>(-1);
 constexpr int maxJobs = 1024;
 constexpr auto lookEvery = std::chrono::milliseconds(20);
 constexpr auto tellEvery = std::chrono::milliseconds(100);
+constexpr double endsItself = 2;  // over its limit, in which a process may give its item up by itself [s]
 
 // What the processes share: pages that a fork does not copy.
 struct Shared {
@@ -104,7 +105,7 @@ double cpuOfChildren()
 class Processes {
 public:
     Processes(Shared& shared, std::size_t count, std::size_t jobs, const PoolWork& work)
-        : shared_(shared), count_(count), work_(work), pids_(jobs, 0)
+        : shared_(shared), count_(count), work_(work), pids_(jobs, 0), tasks_(jobs)
     {
     }
     ~Processes()
@@ -127,7 +128,7 @@ public:
         std::ranges::for_each(pids_, [](pid_t pid) { return pid > 0 ? ::kill(pid, SIGKILL) : 0; });
     }
 
-    // Takes in those that have ended; how many run.
+    // Takes in those that have ended, and kills those that are over the limit; how many run.
     std::size_t look(bool abandoned)
     {
         std::size_t running = 0;
@@ -137,7 +138,10 @@ public:
                 pids_[slot] = 0;
                 ended(slot, status, abandoned);
             }
-            running += pids_[slot] > 0 ? 1 : 0;
+            if (pids_[slot] > 0) {
+                ++running;
+                watch(slot);
+            }
         }
         return running;
     }
@@ -154,6 +158,22 @@ private:
         }
         base::failIf(pid < 0, "a process cannot be started ({}): use fewer --jobs", std::strerror(errno));
         pids_[slot] = pid;
+        tasks_[slot] = {};
+    }
+
+    // A process that stands still, or builds a model, gives no item up by itself.
+    void watch(std::size_t slot)
+    {
+        const std::size_t item = shared_.item[slot];
+        Task& task = tasks_[slot];
+        if (task.item != item) {
+            task = {item, Clock::now()};
+        }
+        const double seconds = std::chrono::duration<double>(Clock::now() - task.since).count();
+        if (item != idle && !task.late && seconds > work_.limit + endsItself) {
+            task.late = true;
+            ::kill(pids_[slot], SIGKILL);
+        }
     }
 
     void ended(std::size_t slot, int status, bool abandoned)
@@ -163,11 +183,14 @@ private:
         }
         const std::size_t item = shared_.item[slot];
         const int signal = WTERMSIG(status);
+        const bool late = tasks_[slot].late && tasks_[slot].item == item;
         std::size_t again = idle;
-        if (item != idle && (signal == SIGKILL || signal == SIGTERM) && tried_.insert(item).second) {
+        if (item != idle && !late && (signal == SIGKILL || signal == SIGTERM) && tried_.insert(item).second) {
             again = item;
         } else if (item != idle) {
-            work_.lost(item, signal);
+            work_.lost(item, late ? fmt::format("took over {:g} s and its process was ended (case_limit_s in the plan)",
+                                                work_.limit)
+                                  : fmt::format("its process was ended by signal {} ({})", signal, strsignal(signal)));
             ++shared_.done;
         }
         if (!shared_.stop) {
@@ -175,10 +198,18 @@ private:
         }
     }
 
+    // What a process works on, as it was seen.
+    struct Task {
+        std::size_t item = idle;
+        Clock::time_point since;
+        bool late = false;  // and was killed for it
+    };
+
     Shared& shared_;
     std::size_t count_;
     const PoolWork& work_;
     std::vector<pid_t> pids_;
+    std::vector<Task> tasks_;
     std::set<std::size_t> tried_;  // items that were killed once
 };
 
@@ -221,16 +252,17 @@ PoolResult runLocally(SweepFolder& folder, const std::vector<std::size_t>& cases
             folder.write(runCase(*runner, folder, cases[item], build));
         };
     };
-    work.lost = [&](std::size_t item, int signal) {
+    work.lost = [&](std::size_t item, const std::string& why) {
         SweepRow row;
         row.index = cases[item];
         row.build = build;
         row.machine = base::hostName();
-        row.error = fmt::format("its process was ended by signal {} ({})", signal, strsignal(signal));
+        row.error = why;
         folder.write(row);
     };
     work.told = told;
     work.abandoned = abandoned;
+    work.limit = folder.plan().caseLimit;
     return runPool(cases.size(), jobs, work);
 }
 

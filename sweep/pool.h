@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,12 +14,14 @@ namespace palpate::sweep {
 struct PoolWork {
     /// Called once in each process; gives what the process does with an item. Whatever throws there ends the pool.
     std::function<std::function<void(std::size_t item)>()> start;
-    /// A process died of `signal` while it worked on the item. Called in this process.
-    std::function<void(std::size_t item, int signal)> lost;
+    /// A process died while it worked on the item. Called in this process.
+    std::function<void(std::size_t item, const std::string& why)> lost;
     /// Called ten times a second in this process; false: no more items are begun.
     std::function<bool(std::size_t done, std::size_t running)> told;
     /// Whether to abandon what is running too.
     std::function<bool()> abandoned;
+    /// Of an item, by the clock, after which its process is killed and the item lost, whatever the process does [s].
+    double limit = std::numeric_limits<double>::infinity();
 };
 
 struct PoolResult {

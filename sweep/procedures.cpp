@@ -78,7 +78,7 @@ private:
 struct Felt {
     double peak = 0, pull = 0, work = 0, held = 0, puncture = none;
     std::uint32_t punctures = 0, heldTicks = 0, contacts = 0;
-    Vec3 last{0.0};
+    Vec3 last{0.0}, force{0.0};  // of the hand, at the last tick
     bool began = false;
 
     void add(const TickRecord& r, Vec3 way)
@@ -86,8 +86,9 @@ struct Felt {
         const double against = -glm::dot(r.total, way);
         peak = std::max(peak, against);
         pull = std::max(pull, -against);
-        work += began ? -glm::dot(r.total, r.device.position - last) : 0.0;
+        work -= began ? 0.5 * glm::dot(force + r.total, r.device.position - last) : 0.0;
         last = r.device.position;
+        force = r.total;
         began = true;
         for (std::uint32_t i = 0; i < r.eventCount; ++i) {
             if (r.events[i].kind == haptics::EventKind::puncture) {
@@ -101,7 +102,7 @@ struct Felt {
         ++heldTicks;
         contacts = r.contacts;
     }
-    double force() const noexcept { return heldTicks > 0 ? held / heldTicks : none; }
+    double heldForce() const noexcept { return heldTicks > 0 ? held / heldTicks : none; }
 };
 
 int ticksIn(double seconds) noexcept
@@ -189,7 +190,7 @@ ProcedureResult press(const Run& run, const Procedure& p)
     Drive drive(place - (tool.radius + gap) * way, way, gap + p.depth, p, false);
     const double tickTime = carryOut(run, drive);
     const Felt& felt = drive.felt();
-    return {{felt.force(), felt.peak, felt.force() / p.depth, 1e3 * felt.work, static_cast<double>(felt.contacts)},
+    return {{felt.heldForce(), felt.peak, felt.heldForce() / p.depth, 1e3 * felt.work, static_cast<double>(felt.contacts)},
             tickTime};
 }
 
@@ -201,7 +202,7 @@ ProcedureResult needle(const Run& run, const Procedure& p)
     Drive drive(model.approach.entry - outside * way, way, outside + p.depth, p, true);
     const double tickTime = carryOut(run, drive);
     const Felt& felt = drive.felt();
-    return {{felt.puncture, static_cast<double>(felt.punctures), felt.peak, felt.force(), felt.pull, 1e3 * felt.work},
+    return {{felt.puncture, static_cast<double>(felt.punctures), felt.peak, felt.heldForce(), felt.pull, 1e3 * felt.work},
             tickTime};
 }
 

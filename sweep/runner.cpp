@@ -86,9 +86,8 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
             throw RecordFailed(e.what());
         }
     }
-    const auto begin = std::chrono::steady_clock::now();
     const auto watch = [&](const haptics::TickRecord&, const haptics::ServoTiming&) {
-        base::failIf(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > plan_.caseLimit,
+        base::failIf(std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count() > plan_.caseLimit,
                      "took over {:g} s and was aborted (case_limit_s in the plan)", plan_.caseLimit);
     };
     auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr, watch);
@@ -111,6 +110,7 @@ const CaseRunner::Measured& CaseRunner::referenceOf(const SweepCase& c)
 
 CaseRow CaseRunner::run(std::size_t index, const std::filesystem::path& record)
 {
+    began_ = std::chrono::steady_clock::now();
     const SweepCase c = sweepCase(plan_, index);
     const Measured own = measure(c.scene, c.procedure, c.seed, record);
     const Measured* const reference = plan_.reference.empty() ? nullptr : &referenceOf(c);

@@ -13,14 +13,20 @@ namespace {
 
 constexpr double rounding = 1e-12;  // of what does not vary: what a mean is off, as a fraction
 
-// What does not vary depends on nothing. Its variance need not be 0, as its mean is rounded.
+// What does not vary depends on nothing. Its variance need not be 0, as its mean is rounded. Of the values that are finite.
 bool varies(std::span<const double> values)
 {
-    if (values.empty()) {
-        return false;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const double v : values) {
+        low = std::isfinite(v) ? std::min(low, v) : low;
+        high = std::isfinite(v) ? std::max(high, v) : high;
     }
-    const auto [low, high] = std::ranges::minmax(values);
     return high - low > rounding * std::max(std::abs(low), std::abs(high));
+}
+
+bool isWhole(std::span<const double> sample)
+{
+    return std::ranges::all_of(sample, [](double v) { return std::isfinite(v); });
 }
 
 constexpr int resamples = 200;  // of the bootstrap
@@ -65,7 +71,7 @@ std::vector<SobolIndex> sobolIndices(std::span<const double> outputs, std::size_
     std::vector<Sample> samples;
     for (std::size_t at = 0; at + block <= outputs.size(); at += block) {
         const Sample sample = outputs.subspan(at, block);
-        if (std::ranges::all_of(sample, [](double v) { return std::isfinite(v); })) {
+        if (isWhole(sample)) {
             samples.push_back(sample);
         }
     }
@@ -100,9 +106,21 @@ std::vector<SobolIndex> sobolIndices(std::span<const double> outputs, std::size_
     return out;
 }
 
+std::size_t wholeSamples(std::span<const double> outputs, std::size_t block)
+{
+    std::size_t count = 0;
+    for (std::size_t at = 0; at + block <= outputs.size(); at += block) {
+        count += isWhole(outputs.subspan(at, block)) ? 1 : 0;
+    }
+    return count;
+}
+
 std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<const double> outputs)
 {
-    const std::size_t axes = points.empty() ? 0 : points[0].size();
+    if (points.empty() || !varies(outputs)) {
+        return {};
+    }
+    const std::size_t axes = points[0].size();
     std::vector<std::vector<double>> effects(axes);
     std::vector<bool> moves(axes, false);
     for (std::size_t i = 0; i + 1 < points.size(); ++i) {

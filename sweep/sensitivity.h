@@ -17,6 +17,8 @@ struct SobolIndex {
 /// by Jansen 1999. A sample with a value that is not finite is left out. Empty when fewer than two are left, or nothing
 /// varies.
 std::vector<SobolIndex> sobolIndices(std::span<const double> outputs, std::size_t axes);
+/// How many samples of so many outputs in a row have only values that are finite.
+std::size_t wholeSamples(std::span<const double> outputs, std::size_t block);
 
 /// Elementary effects of an axis, over its whole range.
 struct MorrisEffect {
@@ -27,7 +29,8 @@ struct MorrisEffect {
 
 /// Effects of every axis from the outputs at `points`: those of morrisPoints(), at the places that the axes could take
 /// (Axis::placeAt). A trajectory in which an axis keeps its place says nothing about it; one that never moves has no
-/// effect. Steps from or to a value that is not finite are left out. Empty when an axis that moves has none other.
+/// effect. Steps from or to a value that is not finite are left out. Empty when an axis that moves has none other, or
+/// nothing varies.
 std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<const double> outputs);
 
 /// Fraction of the variance over a full grid that the mean at each value of an axis makes: the first-order index there.

@@ -41,6 +41,7 @@ std::vector<double> meansOf(const SweepPlan& plan, const std::vector<std::option
 struct Ranking {
     std::string method;
     std::vector<std::string> measures;
+    std::size_t block;  // points in a row that make a sample
     // For an output's means: the measures of each axis; empty: none can be had. The first one decides the order.
     std::vector<std::vector<double>> (*of)(const SweepPlan&, const std::vector<double>&);
 };
@@ -103,14 +104,16 @@ Ranking rankingOf(const SweepPlan& plan)
                 "Sobol's indices: shares of the variance, with all that an axis has a part in (total) and by itself "
                 "(first); errors: half of a 95 % interval",
                 {"total", "total_error", "first", "first_error"},
+                plan.axes.size() + 2,
                 bySobol};
         case DesignKind::morris:
             return {"Morris's elementary effects over the whole range: mean size, mean, spread",
                     {"mu_star", "mu", "sigma"},
+                    plan.axes.size() + 1,
                     byMorris};
         case DesignKind::grid:
             if (plan.constraints.empty()) {
-                return {"Share of the variance over the grid that an axis makes by itself", {"share"}, byShare};
+                return {"Share of the variance over the grid that an axis makes by itself", {"share"}, 1, byShare};
             }
             break;
         case DesignKind::list:
@@ -118,7 +121,8 @@ Ranking rankingOf(const SweepPlan& plan)
         case DesignKind::sobol:
             break;
     }
-    return {"Spearman's rank correlation of axis and output: its size, and with its sign", {"size", "correlation"}, byRank};
+    return {
+        "Spearman's rank correlation of axis and output: its size, and with its sign", {"size", "correlation"}, 1, byRank};
 }
 
 }  // namespace
@@ -126,9 +130,14 @@ Ranking rankingOf(const SweepPlan& plan)
 json sensitivity(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows)
 {
     const Ranking ranking = rankingOf(plan);
-    json outputs = json::object();
+    json outputs = json::object(), used = json::object();
     for (std::size_t o = 0; o < plan.outputs.size(); ++o) {
-        const auto values = ranking.of(plan, meansOf(plan, rows, o));
+        const auto means = meansOf(plan, rows, o);
+        auto values = ranking.of(plan, means);
+        if (values.empty()) {
+            const std::vector<double> none(ranking.measures.size(), std::numeric_limits<double>::quiet_NaN());
+            values.assign(plan.axes.size(), none);
+        }
         std::vector<std::pair<double, json>> ranked;
         for (std::size_t a = 0; a < values.size(); ++a) {
             json of = json::array();
@@ -142,8 +151,13 @@ json sensitivity(const SweepPlan& plan, const std::vector<std::optional<SweepRow
             list.push_back(std::move(entry));
         }
         outputs[plan.outputs[o].name] = std::move(list);
+        used[plan.outputs[o].name] = wholeSamples(means, ranking.block);
     }
-    return {{"method", ranking.method}, {"measures", ranking.measures}, {"outputs", std::move(outputs)}};
+    return {{"method", ranking.method},
+            {"measures", ranking.measures},
+            {"outputs", std::move(outputs)},
+            {"used", std::move(used)},
+            {"samples", plan.points.size() / ranking.block}};
 }
 
 }  // namespace palpate::sweep

@@ -1,8 +1,10 @@
 #include <sweep/slurm.h>
 
 #include <base/child_process.h>
+#include <base/descriptor.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/process.h>
 #include <base/shell_word.h>
 #include <base/split.h>
 #include <sweep/lock.h>
@@ -12,18 +14,19 @@
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
-#include <sys/wait.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
-#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <map>
-#include <memory>
 #include <set>
-#include <sstream>
+#include <string_view>
 #include <thread>
 
 namespace palpate::sweep {
@@ -41,30 +44,45 @@ constexpr auto settleTime = std::chrono::seconds(2);  // for files of another ma
 constexpr int maxSilence = 600;                       // looks in a row that the controller may leave unanswered
 
 struct Answer {
-    int status = 0;
-    std::string text;  // standard output and error
+    int status = 0;           // 127: there is no such program
+    std::string text, error;  // standard output; standard error
 };
 
+// A file in memory that takes what a program prints: as much as it likes, on two streams at once.
+class Printed {
+public:
+    Printed() : file_(::memfd_create("palpate-slurm", MFD_CLOEXEC))
+    {
+        base::failIf(!file_, "no memory for the answer of a program ({})", std::strerror(errno));
+    }
+    int stream() const noexcept { return *file_; }
+    // Without the line's end.
+    std::string text() const
+    {
+        std::string text;
+        std::array<char, 4096> part{};
+        ::lseek(*file_, 0, SEEK_SET);
+        for (ssize_t n = 0; (n = ::read(*file_, part.data(), part.size())) > 0;) {
+            text.append(part.data(), static_cast<std::size_t>(n));
+        }
+        return text.erase(text.find_last_not_of('\n') + 1);
+    }
+
+private:
+    base::Descriptor file_;
+};
+
+// Warnings, such as one of a configuration that differs, are no part of an answer.
 Answer ask(const std::vector<std::string>& words)
 {
-    std::string line;
-    for (const std::string& word : words) {
-        line += base::shellWord(word) + " ";
+    const Printed out, err;
+    const auto [pid, error] = base::start({words, {-1, out.stream(), err.stream()}});
+    if (error == ENOENT) {
+        return {127, "", ""};
     }
-    const auto closed = [](FILE* f) { pclose(f); };
-    std::unique_ptr<FILE, decltype(closed)> pipe(popen((line + "2>&1").c_str(), "r"), closed);
-    base::failIf(!pipe, "{}: cannot be started", words[0]);
-    Answer answer;
-    std::array<char, 4096> part{};
-    while (const std::size_t n = std::fread(part.data(), 1, part.size(), pipe.get())) {
-        answer.text.append(part.data(), n);
-    }
-    const int status = pclose(pipe.release());
-    answer.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-    while (!answer.text.empty() && answer.text.back() == '\n') {
-        answer.text.pop_back();
-    }
-    return answer;
+    base::failIf(error != 0, "{}: cannot be started ({})", words[0], std::strerror(error));
+    const int status = base::exitStatus(pid);
+    return {status, out.text(), err.text()};
 }
 
 std::string oneLine(std::string text)
@@ -112,7 +130,7 @@ public:
         base::writeWhole(script, scriptText(file, chunks.size()));
         const Answer answer = ask({"sbatch", "--parsable", script.string()});
         base::failIf(answer.status != 0, "sbatch: {}",
-                     answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.text));
+                     answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.error));
         s.job = answer.text.substr(answer.text.rfind('\n') + 1);
         s.job = s.job.substr(0, s.job.find(';'));
         jobs_.push_back(std::move(s));
@@ -125,9 +143,9 @@ public:
         std::vector<std::size_t> lost;
         for (Submission& s : jobs_) {
             const Answer answer = ask({"squeue", "-h", "-r", "-j", s.job, "-o", "%K %T"});
-            const bool gone = answer.text.find("Invalid job id") != std::string::npos;
+            const bool gone = answer.error.find("Invalid job id") != std::string::npos;
             if (answer.status != 0 && !gone) {
-                base::failIf(++silence_ > maxSilence, "squeue: {}", oneLine(answer.text));
+                base::failIf(++silence_ > maxSilence, "squeue: {}", oneLine(answer.error));
                 running += s.tasks.size();
                 continue;
             }
@@ -177,28 +195,48 @@ private:
 
     void takeIn(Submission& s, const std::string& queue, std::vector<std::size_t>& lost)
     {
-        std::set<std::size_t> there;
-        std::istringstream lines(queue);
-        std::string state;
-        for (std::size_t task = 0; lines >> task >> state;) {
-            there.insert(task);
-            ++(state == "PENDING" ? waiting : running);
-        }
+        const std::set<std::size_t> there = tasksIn(queue);
+        std::vector<std::string> cancel{"scancel"};
         for (auto task = s.tasks.begin(); task != s.tasks.end();) {
             const bool done = std::ranges::all_of(task->second, [&](std::size_t i) { return folder_.has(i); });
-            if (!done && there.contains(task->first)) {
+            if (!done && !isGone(s.job, task->first, there)) {
                 ++task;
                 continue;
             }
-            const auto now = std::chrono::steady_clock::now();
-            const auto gone = seenGone_.try_emplace({s.job, task->first}, now).first->second;
-            if (!done && now - gone < settleTime) {
-                ++task;
-                continue;
+            if (!done) {
+                cancel.push_back(fmt::format("{}_{}", s.job, task->first));
             }
             std::ranges::copy_if(task->second, std::back_inserter(lost), [&](std::size_t i) { return !folder_.has(i); });
             task = s.tasks.erase(task);
         }
+        if (cancel.size() > 1) {
+            ask(cancel);  // what the queue does not show and works all the same would work beside its successor
+        }
+    }
+
+    // Counts them by their state. Lines of something else are passed over.
+    std::set<std::size_t> tasksIn(const std::string& queue)
+    {
+        std::set<std::size_t> there;
+        for (const std::string_view line : base::splitAt('\n', queue)) {
+            const auto blank = line.find(' ');
+            if (const auto task = base::numberIn<std::size_t>(line.substr(0, blank)); task && blank != std::string::npos) {
+                there.insert(*task);
+                ++(line.substr(blank + 1).starts_with("PENDING") ? waiting : running);
+            }
+        }
+        return there;
+    }
+
+    // Whether it has been out of the queue for as long as its files may take to be seen.
+    bool isGone(const std::string& job, std::size_t task, const std::set<std::size_t>& there)
+    {
+        if (there.contains(task)) {
+            seenGone_.erase({job, task});
+            return false;
+        }
+        const auto now = std::chrono::steady_clock::now();
+        return now - seenGone_.try_emplace({job, task}, now).first->second >= settleTime;
     }
 
     SweepFolder& folder_;

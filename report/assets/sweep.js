@@ -175,8 +175,9 @@ function drawMap(o, a, b) {
 }
 
 function drawRank(o) {
-  const s = data.sensitivity, list = s.outputs[data.outputs[o]] || [];
-  byId("method").textContent = list.length ? s.method + "." : "No ranking can be had: cases are missing, or the output does not vary.";
+  const s = data.sensitivity, all = s.outputs[data.outputs[o]], list = all.some((e) => e.values[0] !== null) ? all : [];
+  const whole = `${s.used[data.outputs[o]]} of ${s.samples} samples are whole.`;
+  byId("method").textContent = `${list.length ? s.method + "." : "No ranking can be had: cases are missing, or the output does not vary."} ${whole}`;
   const cells = (tag, values) => values.map((v) => { const e = document.createElement(tag); e.textContent = v; return e; });
   const line = (tag, values) => { const tr = document.createElement("tr"); tr.append(...cells(tag, values)); return tr; };
   byId("indices").replaceChildren(...(list.length ? [line("th", ["axis", ...s.measures]), ...list.map((e) => line("td", [e.axis, ...e.values.map(short)]))] : []));

@@ -172,6 +172,19 @@ void shorten(KernelArguments& o)
     }
 }
 
+// All before the first measurement, which takes minutes: one of them may be none.
+std::vector<haptics::SessionModel> modelsOf(const KernelArguments& o, command::Progress& progress)
+{
+    std::vector<std::string> subjects = o.scenes;
+    subjects.insert(subjects.end(), o.volumes.begin(), o.volumes.end());
+    return base::mapped<haptics::SessionModel>(subjects, [&](const std::string& subject) {
+        progress.show(subject + ": volume");
+        session::SceneChanges changes;
+        changes.model = "spring";  // the bodies are made here, one per setting
+        return session::openSession(subject, changes);
+    });
+}
+
 void benchKernelCommand(KernelArguments o)
 {
     base::checkOutput(o.json);
@@ -183,19 +196,15 @@ void benchKernelCommand(KernelArguments o)
         o.scenes = {"block", "layered", "plate", "pair", "breast"};
     }
     const bool tell = o.json != "-";
+    const auto request = requestOf(o);
+    std::vector<KernelCase> cases;
+    command::Progress progress;
+    const auto models = modelsOf(o, progress);
+    progress.clear();
     if (tell) {
         printHead();
     }
-    const auto request = requestOf(o);
-    std::vector<KernelCase> cases;
-    std::vector<std::string> subjects = o.scenes;
-    subjects.insert(subjects.end(), o.volumes.begin(), o.volumes.end());
-    command::Progress progress;
-    for (const std::string& subject : subjects) {
-        progress.show(subject + ": volume");
-        session::SceneChanges changes;
-        changes.model = "spring";  // the bodies are made here, one per setting
-        const auto model = session::openSession(subject, changes);
+    for (const haptics::SessionModel& model : models) {
         benchKernel(
             model, request, [&](const std::string& what) { progress.show(what); },
             [&](const KernelCase& c) {

@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
+#include <base/quantities.h>
 #include <base/temporary_folder.h>
 #include <channel/layout.h>
 #include <command/json.h>
@@ -24,6 +25,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::studies {
@@ -157,9 +159,19 @@ void printSync(const nlohmann::json& f)
                f["frames_per_second"][0].get<double>(), f["frames_per_second"][1].get<double>());
 }
 
+// Of the viewers: what they refuse is said here, once and before the session.
+void checkSize(const std::string& size)
+{
+    constexpr int least = 320, most = 8192;
+    const auto [width, height] = base::pixelsOf(size).value_or(std::pair(0, 0));
+    base::failIf(std::min(width, height) < least || std::max(width, height) > most,
+                 "--size {}: must be WIDTHxHEIGHT, each side {} to {} pixels", size, least, most);
+}
+
 void benchSync(const SyncOptions& o)
 {
     base::checkOutput(o.json);
+    checkSize(o.size);
     const auto model = session::openSession(o.scene, o.changes);
     const auto info = session::describeSession(model, o.scene, "hand");
     const base::TemporaryFolder scratch("what the viewers write");

@@ -60,6 +60,18 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--voxels", "0"}, "--voxels");
+    for (const std::vector<std::string>& bench : {std::vector<std::string>{"tick", "nix.toml"},
+                                                  {"kernel", "--scenes", "block,foo"},
+                                                  {"kernel", "--volume", "nix.vdb"}}) {
+        std::vector<std::string> words{"bench"};
+        words.insert(words.end(), bench.begin(), bench.end());
+        EXPECT_EQ(palpate(words).out, "") << "a heading of nothing: " << bench.back();
+        expectRefusal(words, "no such");
+    }
+    for (const std::string size : {"10", "0x0", "319x320", "99999x99999", "640x480x2"}) {
+        expectRefusal({"bench", "sync", "--size", size},
+                      "--size " + size + ": must be WIDTHxHEIGHT, each side 320 to 8192");
+    }
     expectRefusal({"train", "--setting", "nosuch"}, "nosuch");
     expectRefusal({"train", "block", "--headless", "--model", "spring", "--setting", "fine"},
                   "block: the tissue model is spring: --setting changes nothing");

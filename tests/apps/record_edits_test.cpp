@@ -125,6 +125,8 @@ TEST_F(RecordEdits, EachIsNamedByReplayAndScore)
         EXPECT_EQ(std::ranges::count(replayed.err, '\n'), open ? 0 : 1) << replayed.err;
         EXPECT_NE(scored.err.find(edit.score), std::string::npos) << edit.sql << "\nscore: " << scored.err;
         EXPECT_TRUE(scored.status == 0 || scored.status == 1) << edit.sql;
+        // The seal says that it was changed, and the build is this one.
+        EXPECT_EQ(replayed.err.find("made by another"), std::string::npos) << replayed.err;
     }
 }
 
@@ -138,6 +140,7 @@ TEST_F(RecordEdits, WhatIsComputedAgainShowsWithoutTheSealToo)
             const Outcome replayed = palpate({"replay", file});
             EXPECT_EQ(replayed.status, 1) << edit.sql;
             EXPECT_NE(replayed.err.find(edit.replay), std::string::npos) << edit.sql << "\nreplay: " << replayed.err;
+            EXPECT_EQ(replayed.err.find("another build"), std::string::npos) << edit.sql << "\nreplay: " << replayed.err;
         }
     }
 }
@@ -169,7 +172,9 @@ TEST_F(RecordEdits, AStateOfAnEditedRecordIsNotExported)
     const std::string out = folder / "state.nrrd";
     const Outcome exported = palpate({"export", "--record", file, "--at", "1s", "-o", out});
     EXPECT_EQ(exported.status, 1);
-    EXPECT_NE(exported.err.find("differs from tick 500 on"), std::string::npos) << exported.err;
+    EXPECT_NE(exported.err.find("differs from tick 500 on: the record was changed after it was closed: "),
+              std::string::npos)
+        << exported.err;
     EXPECT_NE(exported.err.find("total_y_n"), std::string::npos) << exported.err;
     EXPECT_FALSE(std::filesystem::exists(out));
     // What comes behind a state is not read for it.

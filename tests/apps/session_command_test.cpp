@@ -11,6 +11,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <random>
@@ -92,6 +93,28 @@ TEST(Session, AReplayGivesTheSameBits)
     EXPECT_GT(trained.at("peak_force_n").at("basic").get<double>(), 0.0) << "nothing was felt, so nothing was compared";
 }
 
+// What the record says of its session under a key, with the end of the line.
+std::string resultIn(const std::string& record, const std::string& key)
+{
+    return Program("/usr/bin/sqlite3", {record, "SELECT value FROM results WHERE key = '" + key + "'"}).wait().out;
+}
+
+// A session that keeps no clock has not measured how late it was.
+TEST(Session, WithoutAClockThereIsNoLateness)
+{
+    const auto& [folder, record, trained] = Recorded::once();
+    for (const char* const key : {"/missed_ticks", "/gaps", "/longest_gap_ms", "/lateness_us/p50", "/lateness_us/max"}) {
+        EXPECT_TRUE(trained.at(nlohmann::json::json_pointer(key)).is_null()) << key;
+    }
+    EXPECT_TRUE(trained.at("overruns").is_number());
+    for (const char* const key : {"missed_ticks", "gaps", "longest_gap_ms", "lateness_us_p50", "lateness_us_max"}) {
+        EXPECT_EQ(resultIn(record, key), "\n") << key;
+    }
+    const Outcome said = palpate(scripted() + std::vector<std::string>{"--seconds", "0.1"});
+    EXPECT_TRUE(said.out.starts_with("100 ticks, not paced; a tick takes ")) << said.out;
+    EXPECT_EQ(said.out.find("late by"), std::string::npos) << said.out;
+}
+
 // What the clock did to a session (ticks that came late, a cheaper model) is in the record's samples, so that a replay,
 // which knows neither clock nor recorder, has the same forces; and where no tick was missed, so has an unpaced session.
 TEST(Session, ForcesDependOnTheClockOnlyThroughWhatTheRecordSays)
@@ -103,6 +126,9 @@ TEST(Session, ForcesDependOnTheClockOnlyThroughWhatTheRecordSays)
     const auto replayed = figures({"replay", record});
     EXPECT_EQ(replayed.at("identical"), true);
     EXPECT_EQ(replayed.at("force_hash"), paced.at("force_hash"));
+    for (const char* const key : {"lateness_us_p50", "lateness_us_p99", "lateness_us_p999", "lateness_us_max"}) {
+        EXPECT_GT(std::atof(resultIn(record, key).c_str()), 0.0) << key;
+    }
     if (paced.at("missed_ticks") == 0) {
         const auto unpaced = figures(half + std::vector<std::string>{"--unpaced"});
         EXPECT_EQ(paced.at("force_hash"), unpaced.at("force_hash"));

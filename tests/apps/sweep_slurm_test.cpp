@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <thread>
 
@@ -80,6 +81,42 @@ TEST(SweepOnSlurm, ItsTableIsThatOfOneMachineAlsoWhenATaskIsKilled)
     EXPECT_EQ(done["failed"], 0);
     EXPECT_EQ(sameOnEveryRun(local), sameOnEveryRun(cluster));
     expectRefusal({"sweep", plan, "-o", here / "refused", "--slurm", "--partition", "nowhere"}, "sbatch: ");
+}
+
+// A cluster in four files. Tasks of its first job are never there. Those of the second wait in the queue for longer than
+// the files of a task that has ended may take, and squeue has warnings on both of its streams.
+void writeForgetfulCluster(const Folder& place)
+{
+    const std::string d = place.path().string();
+    writeText(place / "sbatch", "#!/bin/sh\nn=$(($(cat " + d + "/jobs || echo 0) + 1))\necho $n > " + d +
+                                    "/jobs\necho 'sbatch: a warning' >&2\necho $n\n[ $n = 1 ] && exit 0\ntouch " + d +
+                                    "/2\n(sleep 3; SLURM_ARRAY_TASK_ID=0 sh $2; rm " + d +
+                                    "/2) > /dev/null 2>&1 < /dev/null &\n");
+    writeText(place / "squeue",
+              "#!/bin/sh\necho 'squeue: slurm.conf differs' >&2\necho 'slurm.conf differs, and this is line 0'\n"
+              "[ -e " +
+                  d + "/$4 ] && echo '0 RUNNING'\nexit 0\n");
+    writeText(place / "scancel", "#!/bin/sh\necho \"$@\" >> " + d + "/cancelled\n");
+    for (const char* const program : {"sbatch", "squeue", "scancel"}) {
+        fs::permissions(place / program, fs::perms::owner_all);
+    }
+}
+
+// Tasks that the queue shows are not submitted again, whatever else the tools say; a task that it does not show is
+// cancelled before its cases are another's.
+TEST(SweepOnSlurm, WarningsAreNoPartOfTheQueueAndALostTaskIsCancelled)
+{
+    const Folder place, here;
+    writeForgetfulCluster(place);
+    writeText(here / "p.toml", shortPlan(1));
+    const std::string program = fs::path(PALPATE_BIN_DIR) / "palpate", path = std::getenv("PATH");
+    const Outcome outcome = Program("/usr/bin/env", {"PATH=" + place.path().string() + ":" + path, program, "sweep",
+                                                     here / "p.toml", "-o", here / "s", "--slurm", "--chunk", "12"})
+                                .wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(filesOf(here / "s", ".sh"), 2U) << "a task that runs was submitted again";
+    EXPECT_EQ(readText(place / "cancelled"), "1_0\n");
+    EXPECT_EQ(casesIn(here / "s"), 12U);
 }
 
 }  // namespace

@@ -97,6 +97,27 @@ TEST(Score, WorkOnTheTissueIsForceTimesWay)
     EXPECT_NEAR(scoreTicks(ticks).tissueWork, 0.0, 1e-9);
 }
 
+// A spring pressed by x takes k x^2 / 2 at any speed, and gives it back; a tremor in it takes nothing.
+TEST(Score, WorkOnASpringIsItsEnergyAtAnySpeed)
+{
+    constexpr double k = 100, x = 0.04;  // [N/m], [m]
+    const auto workOf = [&](std::vector<TickRecord> ticks) {
+        for (TickRecord& tick : ticks) {
+            tick.basic = {0, -k * std::max(0.0, tick.device.position.y), 0};
+        }
+        return scoreTicks(ticks).tissueWork;
+    };
+    for (const double seconds : {0.02, 0.1, 2.0}) {
+        EXPECT_NEAR(workOf(along({{0, 0}, {seconds, x}})), k * x * x / 2, 1e-9) << seconds;
+        EXPECT_NEAR(workOf(along({{0, 0}, {seconds, x}, {2 * seconds, 0}, {3 * seconds, -x}})), 0, 1e-9) << seconds;
+    }
+    std::vector<synthetic::Key> tremor{{0, 0}, {1, x}};
+    for (int i = 0; i < 40; ++i) {
+        tremor.push_back({1.05 + 0.05 * i, i % 2 == 0 ? x - 1e-3 : x});
+    }
+    EXPECT_NEAR(workOf(along(tremor)), k * x * x / 2, 1e-9);
+}
+
 // Two marks 12 mm apart across the finger, their middle 5 mm beside the target's; how deep a mark is does not count.
 TEST(Score, MarksAreJudgedAcrossTheTool)
 {

@@ -120,9 +120,11 @@ TEST(FittingSetting, LearnsFromASessionThatWasTooSlow)
     const auto noon = std::chrono::system_clock::time_point(std::chrono::hours(500000));
     datasets::Scene scene = *datasets::builtInScene("find-lump");
     std::uint64_t ticks = 1000;
+    bool paced = true;
     const auto learn = [&](const std::filesystem::path& file, const char* setting, std::uint64_t overruns) {
         scene.model.setting = setting;
         haptics::ServoTiming timing;
+        timing.paced = paced;
         timing.ticks = ticks;
         timing.overruns = overruns;
         return learnFrom(file, scene, timing, noon);
@@ -137,6 +139,9 @@ TEST(FittingSetting, LearnsFromASessionThatWasTooSlow)
         << "nothing is known of needles";
     EXPECT_EQ(learn(cache, "fine", 20), "default");
     EXPECT_EQ(learn(cache, "fast", 500), "") << "nothing is faster";
+    paced = false;
+    EXPECT_EQ(learn(cache, "default", 500), "") << "nobody felt that it was slow";
+    paced = true;
     EXPECT_EQ(learn({}, "default", 500), "") << "there is no cache to write to";
     ticks = 999;
     EXPECT_EQ(learn(cache, "default", 500), "") << "under a second";

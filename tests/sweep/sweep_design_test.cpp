@@ -235,6 +235,50 @@ TEST(MorrisEffects, OfListsWordsAndWholeNumbersAreOverTheRangeToo)
     }
 }
 
+std::vector<std::optional<SweepRow>> rowsOf(const SweepPlan& plan, double (*f)(const std::vector<double>&))
+{
+    std::vector<std::optional<SweepRow>> rows(plan.cases());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        rows[i] = SweepRow();
+        rows[i]->index = i;
+        rows[i]->outputs = {f(plan.points[i])};
+    }
+    return rows;
+}
+
+// One of 8 samples has a case that failed: the ranking is of 7, and says so. Where there is no ranking, every axis has
+// null.
+TEST(Sensitivity, SaysHowManySamplesAreWholeAndNullWhereThereIsNone)
+{
+    for (const DesignKind kind : {DesignKind::saltelli, DesignKind::morris, DesignKind::sobol, DesignKind::grid}) {
+        SweepPlan plan;
+        plan.design = kind;
+        plan.axes.resize(2);
+        plan.axes[0].name = "a";
+        plan.axes[1].name = "b";
+        plan.axes[0].high = plan.axes[1].high = 1;
+        plan.axes[0].steps = plan.axes[1].steps = 3;
+        plan.outputs = {{"y", ""}};
+        plan.points = kind == DesignKind::saltelli ? saltelliPoints(8, 2, 1)
+                      : kind == DesignKind::morris ? morrisPoints(8, 2, 1)
+                      : kind == DesignKind::sobol
+                          ? sobolPoints(8, 2, 1)
+                          : UnitPoints{{0, 0}, {0, 1}, {1, 0}, {1, 1}, {2, 0}, {2, 1}, {0, 2}, {1, 2}};
+        auto rows = rowsOf(plan, [](const std::vector<double>& u) { return 3 * u[0] + u[1]; });
+        rows[3]->error = "no";
+        const auto some = sensitivity(plan, rows);
+        EXPECT_EQ(some["samples"], 8) << some;
+        EXPECT_EQ(some["used"]["y"], 7) << some;
+        const auto constant = sensitivity(plan, rowsOf(plan, [](const std::vector<double>&) { return 0.1; }));
+        EXPECT_EQ(constant["used"]["y"], 8);
+        ASSERT_EQ(constant["outputs"]["y"].size(), 2U) << constant;
+        for (const auto& entry : constant["outputs"]["y"]) {
+            EXPECT_EQ(entry["values"].size(), constant["measures"].size()) << constant;
+            EXPECT_TRUE(std::ranges::all_of(entry["values"], [](const auto& v) { return v.is_null(); })) << constant;
+        }
+    }
+}
+
 TEST(MorrisEffects, AreNoneWhereAnAxisMovesAndNoCaseIsThere)
 {
     const UnitPoints points{{0, 0}, {1, 0}, {1, 1}};
