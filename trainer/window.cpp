@@ -90,7 +90,8 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     State state = stateOf(options, errands);
     Presses presses(stage, errands);
     std::vector<double> seconds;
-    constexpr int settling = 2;
+    // A press and its release are two pictures, even of one look; what they open is there after two more.
+    constexpr int settling = 4;
     int due = settling;  // pictures until all has settled
     while (!base::EndInOrder::asked() && (options.frames == 0 || seconds.size() < options.frames)) {
         if (stage.closed() && leave(state) == Errand::quit) {

@@ -43,6 +43,12 @@ std::string Desktop::xdotool(const std::vector<std::string>& words) const
     return Program("/usr/bin/env", all).wait().out;
 }
 
+void Desktop::close(const std::string& window) const
+{
+    Program("/usr/bin/env", {"DISPLAY=" + display_, "python3", PALPATE_SOURCE_DIR "/tests/apps/close_window.py", window})
+        .wait();
+}
+
 std::string Desktop::window(const std::string& name, double seconds) const
 {
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);

@@ -24,6 +24,8 @@ public:
     std::unique_ptr<Program> start(const std::string& name, const std::vector<std::string>& arguments) const;
     /// xdotool's own words, such as {"key", "space"}. Returns what it printed.
     std::string xdotool(const std::vector<std::string>& words) const;
+    /// Asks a window to close, as its button does.
+    void close(const std::string& window) const;
     /// Waits for a window of that name, `seconds` at the most; empty when none comes.
     std::string window(const std::string& name, double seconds = 20) const;
 

@@ -187,13 +187,14 @@ TEST(Desktop, ASessionEndsWithTheWindowThatIsItsHand)
     const Desktop desktop;
     const auto train = desktop.start("palpate", {"train", smallLayered(), "--device", "mouse", "--view", "--seconds", "600",
                                                  "--session", session, "--record", folder / "s.db"});
-    ASSERT_FALSE(desktop.window("Palpate").empty());
+    const std::string window = desktop.window("Palpate");
+    ASSERT_FALSE(window.empty());
     const auto eyes = sessionWithHand(session);
     ASSERT_TRUE(eyes);
     desktop.xdotool({"key", "space"});  // fires only while the dead-man switch is held
     wait(0.5);
     EXPECT_EQ(eyes->state()->cores, 0U);
-    desktop.xdotool({"key", "q"});  // asks
+    desktop.close(window);  // asks, as Q does
     wait(0.5);
     EXPECT_EQ(eyes->ending(), channel::Ending::none);
     desktop.xdotool({"key", "q"});
