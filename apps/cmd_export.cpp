@@ -3,6 +3,7 @@
 #include <base/folds.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
+#include <base/window_size.h>
 #include <channel/deformation.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -306,10 +307,10 @@ void addExport(CLI::App& app)
         ->type_name("FILE");
     command->add_option("--like", o->like, "Stored ultrasound picture: repeat its time, probe, settings and size")
         ->type_name("FILE.png");
-    command::addNumber(*command, "--width", o->width, "Width of an ultrasound picture [pixels]", 100, 8192);
+    command::addNumber(*command, "--width", o->width, "Width of an ultrasound picture [pixels]", 100, base::mostSide);
     command::addChoice(*command, "--window", o->window, "Grey-level window of a CT scan", windowChoices);
     command::addNumber(*command, "--height", o->height,
-                       "Height of an ultrasound picture, or of a slice of a CT scan [pixels]", 100, 8192);
+                       "Height of an ultrasound picture, or of a slice of a CT scan [pixels]", 100, base::mostSide);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([o, command] { runExport(*command, *o); });
 }

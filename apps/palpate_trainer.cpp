@@ -3,12 +3,14 @@
 #include <base/end_in_order.h>
 #include <base/error.h>
 #include <base/quantities.h>
+#include <base/window_size.h>
 #include <command/json.h>
 #include <trainer/window.h>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -75,8 +77,10 @@ void addOptions(CLI::App& app, Words& w)
 void run(Words& w)
 {
     const auto [width, height] = palpate::base::pixelsOf(w.size).value_or(std::pair(0, 0));
-    palpate::base::failIf(width < 320 || height < 240 || width > 8192 || height > 8192,
-                          "--size {}: must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels", w.size);
+    palpate::base::failIf(
+        width < palpate::base::leastSide || height < 240 || std::max(width, height) > palpate::base::mostSide,
+        "--size {}: must be WIDTHxHEIGHT, {}x240 to {}x{} pixels", w.size, palpate::base::leastSide,
+        palpate::base::mostSide, palpate::base::mostSide);
     w.options.width = width;
     w.options.height = height;
     w.options.programs = palpate::base::programFolder();

@@ -4,6 +4,9 @@
 
 namespace palpate::base {
 
+inline constexpr int leastSide = 320;  // of windows and their pictures [pixels]
+inline constexpr int mostSide = 8192;  // of any picture
+
 struct WindowSize {
     int width = 0, height = 0;  // [pixels]
 };

@@ -272,6 +272,12 @@ private:
 
 }  // namespace
 
+std::string SessionInfo::extraOf(std::string_view key) const
+{
+    const auto found = std::ranges::find(extra, key, &std::pair<std::string, std::string>::first);
+    return found == extra.end() ? std::string() : found->second;
+}
+
 struct Recorder::Impl {
     std::string file;
     std::filesystem::path place;  // absolute: the working directory may change

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct SessionInfo {
     std::vector<std::string> tissues;     // rows of the tissue table
     std::vector<double> warnDistances;    // by structure [m]; 0 for the target
     std::vector<std::pair<std::string, std::string>> extra;
+
+    /// Value of a key of `extra`; empty where it is not there.
+    [[nodiscard]] std::string extraOf(std::string_view key) const;
 };
 
 /// Whether a record is what its writer closed.

@@ -145,19 +145,15 @@ SessionInfo infoOf(const SessionModel& model)
 std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
 {
     const SessionInfo own = infoOf(model);
-    const auto extra = [](const SessionInfo& i, const char* key) {
-        const auto found = std::ranges::find(i.extra, key, &std::pair<std::string, std::string>::first);
-        return found == i.extra.end() ? std::string() : found->second;
-    };
     const auto list = [](const auto& all) { return fmt::format("{}", fmt::join(all, ", ")); };
     struct Said {
         const char* what;
         bool same;
         std::string recorded, own;
     };
-    const std::string shape = extra(info, targetShapeKey), ownShape = extra(own, targetShapeKey);
-    const std::string radius = extra(info, toolRadiusKey), ownRadius = extra(own, toolRadiusKey);
-    const std::string dose = extra(info, scanDoseKey), ownDose = extra(own, scanDoseKey);
+    const std::string shape = info.extraOf(targetShapeKey), ownShape = own.extraOf(targetShapeKey);
+    const std::string radius = info.extraOf(toolRadiusKey), ownRadius = own.extraOf(toolRadiusKey);
+    const std::string dose = info.extraOf(scanDoseKey), ownDose = own.extraOf(scanDoseKey);
     const std::array<Said, 8> all{
         {{"scene", info.scene == own.scene, info.scene, own.scene},
          {"model", info.model == own.model, info.model, own.model},

@@ -38,11 +38,9 @@ double corePoints(double fraction, double length, double error) noexcept
 // 0 where there is none, or none that can be.
 double extraNumber(const SessionInfo& info, const char* key)
 {
-    const auto found = std::ranges::find(info.extra, key, &std::pair<std::string, std::string>::first);
+    const std::string text = info.extraOf(key);
     double number = 0;
-    if (found != info.extra.end()) {
-        std::from_chars(found->second.data(), found->second.data() + found->second.size(), number);
-    }
+    std::from_chars(text.data(), text.data() + text.size(), number);
     return std::isfinite(number) ? std::max(number, 0.0) : 0.0;
 }
 
@@ -89,16 +87,11 @@ std::string toText(const TargetShape& s)
 
 std::optional<TargetShape> targetShapeOf(const SessionInfo& info)
 {
-    for (const auto& [key, value] : info.extra) {
-        std::istringstream in(value);
-        in.imbue(std::locale::classic());
-        TargetShape s;
-        if (key == targetShapeKey &&
-            in >> s.middle.x >> s.middle.y >> s.middle.z >> s.axis.x >> s.axis.y >> s.axis.z >> s.diameter) {
-            return s;
-        }
-    }
-    return std::nullopt;
+    std::istringstream in(info.extraOf(targetShapeKey));
+    in.imbue(std::locale::classic());
+    TargetShape s;
+    const bool whole = !!(in >> s.middle.x >> s.middle.y >> s.middle.z >> s.axis.x >> s.axis.y >> s.axis.z >> s.diameter);
+    return whole ? std::optional(s) : std::nullopt;
 }
 
 double toolRadiusOf(const SessionInfo& info)

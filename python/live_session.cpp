@@ -1,6 +1,7 @@
 #include <python/live_session.h>
 
 #include <base/error.h>
+#include <base/window_size.h>
 #include <haptics/broadcast.h>
 #include <session/figures.h>
 #include <session/open.h>
@@ -10,6 +11,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 
@@ -26,9 +28,8 @@ LiveUltrasound::LiveUltrasound(const haptics::SessionModel& model)
 UltrasoundPicture LiveUltrasound::picture(const haptics::Simulation& simulation, const channel::State& state,
                                           const UltrasoundRequest& request)
 {
-    constexpr int most = 8192;  // pixels along a side
-    base::failIf(request.width < 16 || request.height < 16 || request.width > most || request.height > most,
-                 "ultrasound: width and height are 16 to 8192 pixels");
+    const auto [least, most] = std::minmax(request.width, request.height);
+    base::failIf(least < 16 || most > base::mostSide, "ultrasound: width and height are 16 to {} pixels", base::mostSide);
     haptics::showShape(simulation, *shape_);
     shape_->tick = state.tick;
     body_.apply(*shape_);

@@ -1,6 +1,7 @@
 #include <render/viewer.h>
 
 #include <base/error.h>
+#include <base/window_size.h>
 #include <render/display.h>
 #include <render/hosts.h>
 
@@ -41,9 +42,9 @@ void standBack()
 
 void check(const ViewerOptions& options)
 {
-    constexpr int most = 8192;
-    base::failIf(options.width < leastSide || options.height < leastSide || options.width > most || options.height > most,
-                 "size {}x{}: each side must be 320 to 8192 pixels", options.width, options.height);
+    const auto [least, most] = std::minmax(options.width, options.height);
+    base::failIf(least < base::leastSide || most > base::mostSide, "size {}x{}: each side must be {} to {} pixels",
+                 options.width, options.height, base::leastSide, base::mostSide);
     base::failIf(!(options.every >= 0) || !(options.wait >= 0),
                  "the times for pictures and for waiting must be 0 s or more");
 }

@@ -44,8 +44,6 @@ struct Playback {
     std::atomic<const char*> fault{nullptr};                             // what is wrong with the record, in a few words
 };
 
-inline constexpr int leastSide = 320;  // of windows and pictures [pixels]
-
 /// What a viewer shows, and where.
 struct ViewerOptions {
     std::string session;                   // name; empty = the only one that runs

@@ -52,7 +52,7 @@ Window openWindow(const ViewerOptions& options)
     const auto [width, height] = base::fittedTo(screen, {options.width, options.height});
     Window window(glfwCreateWindow(width, height, "Palpate", nullptr, nullptr));
     base::failIf(!window, "the display has no OpenGL 3.2, which the viewer needs");
-    glfwSetWindowSizeLimits(window.get(), leastSide, leastSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    glfwSetWindowSizeLimits(window.get(), base::leastSide, base::leastSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
     return window;

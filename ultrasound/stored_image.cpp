@@ -4,10 +4,12 @@
 #include <base/inputs.h>
 #include <base/png.h>
 #include <base/vec_json.h>
+#include <base/window_size.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -71,8 +73,8 @@ StoredHow understood(const json& j)
     image.settings = within(s, image.transducer);
     how.width = j.at("width").get<int>();
     how.height = j.at("height").get<int>();
-    constexpr int most = 8192;
-    base::failIf(how.width < 1 || how.height < 1 || how.width > most || how.height > most, "its size is none");
+    base::failIf(std::min(how.width, how.height) < 1 || std::max(how.width, how.height) > base::mostSide,
+                 "its size is none");
     return how;
 }
 

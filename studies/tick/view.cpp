@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/window_size.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <haptics/broadcast.h>
@@ -298,8 +299,8 @@ void addBenchView(CLI::App& bench)
         ->delimiter(',')
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
-    command::addNumber(*view, "--width", o->width, "Of the picture [pixels]", 320, 8192);
-    command::addNumber(*view, "--height", o->height, "Of the picture [pixels]", 320, 8192);
+    command::addNumber(*view, "--width", o->width, "Of the picture [pixels]", base::leastSide, base::mostSide);
+    command::addNumber(*view, "--height", o->height, "Of the picture [pixels]", base::leastSide, base::mostSide);
     command::addNumber(*view, "--frames", o->frames, "Pictures per case", 10, 100000);
     command::addSetting(*view, o->changes);
     view->add_flag("--alone", o->alone, "Run without a servo loop, for comparison");

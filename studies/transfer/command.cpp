@@ -6,6 +6,7 @@
 #include <base/quantiles.h>
 #include <base/quantities.h>
 #include <base/temporary_folder.h>
+#include <base/window_size.h>
 #include <channel/layout.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -162,10 +163,9 @@ void printSync(const nlohmann::json& f)
 // Of the viewers: what they refuse is said here, once and before the session.
 void checkSize(const std::string& size)
 {
-    constexpr int least = 320, most = 8192;
     const auto [width, height] = base::pixelsOf(size).value_or(std::pair(0, 0));
-    base::failIf(std::min(width, height) < least || std::max(width, height) > most,
-                 "--size {}: must be WIDTHxHEIGHT, each side {} to {} pixels", size, least, most);
+    base::failIf(std::min(width, height) < base::leastSide || std::max(width, height) > base::mostSide,
+                 "--size {}: must be WIDTHxHEIGHT, each side {} to {} pixels", size, base::leastSide, base::mostSide);
 }
 
 void benchSync(const SyncOptions& o)
