@@ -247,7 +247,7 @@ private:
     std::vector<occupancy::ShapeDistance> shapes_;
     struct FoundFor {
         occupancy::RoundCone shape;
-        bool isQuartered = false;
+        int pieces = 1;  // piecesUnder()
     };
     std::vector<FoundFor> foundFor_;            // the tools when the sites were looked for
     std::vector<PressedBox> pressed_;           // by each tool, when the sites were looked for

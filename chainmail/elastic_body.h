@@ -49,6 +49,7 @@ struct SurfacePoint {
     Vec3f normal{0.0F};    // unit vector out of the body
     float area = 0;        // [m^2]
     float mu = 0;          // of the tissue under it [Pa]
+    float sliver = 0;      // compliance that its cell lacks because it is nearly empty, see addSurface() [h / E per area]
 };
 
 /// The points in one cell of the finest level: head of a run in ElasticBody::points.
@@ -119,6 +120,7 @@ struct ElasticBody {
     std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
     std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
+    double pieceEdge = 0;     // of the sub-cells of which each of them stands for the surface [m]
     std::vector<float> held;  // of each cell of the finest level, what share of its tissue is held in space
     bool relaxes = false;     // its moduli are those right after a step
 };

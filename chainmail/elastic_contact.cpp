@@ -12,25 +12,39 @@ namespace palpate::chainmail {
 namespace {
 
 // Compliance that cells lack under a patch, in h / E per area: its mean over places in the grid, and by how much it grows
-// with both sums of betweenNodes(). Smaller patches count as the first.
-struct Lacking {
+// with what betweenNodes() says. Smaller patches count as the first.
+struct LackingAt {
     double radius = 0;  // of the patch, in cells
     double mean = 0;
-    double between = 0;
+    double sum = 0;
     double square = 0;
+    double product = 0;
 };
-constexpr std::array<Lacking, 11> lacking{{{0.2, 0.265, 3.35, -12.6},
-                                           {0.3, 0.194, 0.88, -2.64},
-                                           {0.4, 0.186, -0.52, 3.37},
-                                           {0.5, 0.176, -0.61, 3.81},
-                                           {0.6, 0.160, -0.14, 1.94},
-                                           {0.75, 0.140, 0.15, 0.08},
-                                           {1.0, 0.087, -0.02, -0.63},
-                                           {1.1, 0.077, 0.12, -1.39},
-                                           {1.25, 0.066, 0.20, -1.34},
-                                           {1.5, 0.043, -0.07, 0.71},
-                                           {2.0, 0.0, 0.0, 0.0}}};
-constexpr double little = 1.25;  // radius of a patch, in cells, up to which surface points are quartered
+constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
+                                             {0.2, 0.162, 0.16, 0.79, -0.72},
+                                             {0.25, 0.170, 0.15, 1.07, -0.81},
+                                             {0.3, 0.178, 0.15, 1.44, -0.85},
+                                             {0.35, 0.185, 0.18, 1.59, -1.05},
+                                             {0.4, 0.178, 0.13, 1.74, -0.92},
+                                             {0.45, 0.176, 0.17, 1.73, -1.06},
+                                             {0.5, 0.167, 0.15, 1.62, -0.90},
+                                             {0.6, 0.150, 0.10, 1.42, -0.72},
+                                             {0.7, 0.129, 0.02, 1.05, -0.45},
+                                             {0.8, 0.110, -0.01, 0.36, -0.06},
+                                             {0.9, 0.093, 0.02, -0.24, -0.05},
+                                             {1.0, 0.075, -0.04, -0.45, 0.22},
+                                             {1.1, 0.060, -0.05, -0.55, 0.30},
+                                             {1.25, 0.042, -0.06, -0.15, 0.21},
+                                             {1.5, 0.021, -0.14, 0.49, 0.42},
+                                             {1.75, 0.007, -0.10, 0.40, 0.27},
+                                             {2.0, 0.0, 0.0, 0.0, 0.0}}};
+// Cosine between a capsule and its way up to which it lies: what is small then is a strip, of many points.
+constexpr double steep = 0.7;
+// Radius of a patch, in cells, up to which surface points lie as close to each other as that, in cells.
+struct Closeness {
+    double radius, apart;
+};
+constexpr std::array<Closeness, 2> closeness{{{0.75, 0.13}, {1.75, 0.35}}};
 constexpr double slightly = 1e-6;
 constexpr double minRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double maxRatio = 30.0;
@@ -59,9 +73,17 @@ bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept
     return shape.a == shape.b || std::abs(glm::dot(normal, shape.b - shape.a) + shape.radiusB - shape.radiusA) > rounding;
 }
 
-bool touchesLittle(const ElasticTool& tool, double spacing) noexcept
+int piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
 {
-    return tool.pushed != Vec3(0.0) && radiusOfPatch(tool) < little * spacing;
+    if (tool.pushed == Vec3(0.0)) {
+        return 1;
+    }
+    const Vec3 axis = tool.shape.b - tool.shape.a;
+    const bool lies = std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
+    const double patch = radiusOfPatch(tool) / spacing;
+    const auto* const found = std::find_if(closeness.begin() + (lies ? 1 : 0), closeness.end(),
+                                           [&](const Closeness& c) { return patch < c.radius; });
+    return found == closeness.end() ? 1 : static_cast<int>(std::ceil(edge / (found->apart * spacing)));
 }
 
 namespace {
@@ -160,21 +182,27 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     const Vec3 place = glm::fract(((ahead < 0.0 ? b : a) - tool.pushed - grid.origin) / grid.spacing);
     const Vec3 f = place * (1.0 - place), across = 1.0 - inward * inward;
     const double isRound = tool.shape.a == tool.shape.b ? 1.0 : std::min(std::abs(ahead) / depth, 1.0);
-    return {glm::mix(mean.b, glm::dot(across, f), isRound), glm::mix(mean.square, glm::dot(across, f * f), isRound)};
+    const double sum = glm::dot(across, f), square = glm::dot(across, f * f);
+    return {glm::mix(mean.sum, sum, isRound), glm::mix(mean.square, square, isRound),
+            glm::mix(mean.product, 0.5 * (sum * sum - square), isRound)};
 }
 
-double resolvedShare(double radiusInCells, const Between& across, double more) noexcept
+double resolvedShare(double radiusInCells, const Between& across, const Lacking& more) noexcept
 {
     const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
-                                        [](const Lacking& l, double t) { return l.radius < t; });
-    const auto lacksAt = [&](const Lacking& l) {
-        return l.mean + l.between * (across.b - mean.b) + l.square * (across.square - mean.square);
+                                        [](const LackingAt& l, double t) { return l.radius < t; });
+    const double uneven = 1.0 + 1.2 * more.compressible;
+    const auto lacksAt = [&](const LackingAt& l) {
+        return l.mean + uneven * (l.sum * (across.sum - mean.sum) + l.square * (across.square - mean.square) +
+                                  l.product * (across.product - mean.product));
     };
-    const Lacking &to = *above, &from = *(above - 1);
+    const LackingAt &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
-    const double lacks = glm::mix(lacksAt(from), lacksAt(to), t);
-    return 1.0 / (1.0 + penalty * more * std::max(lacks, 0.0));
+    const double soft = std::max(glm::mix(lacksAt(from), lacksAt(to), t), 0.0);
+    const double compressible = 0.62 * more.compressible * std::min(4.0 * radiusInCells, 1.0);
+    const double sliver = more.sliver * std::min(2.0 * radiusInCells, 1.0);
+    return 1.0 / (1.0 + penalty * (more.times * (soft + compressible) + sliver));
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

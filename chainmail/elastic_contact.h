@@ -83,6 +83,7 @@ struct alignas(64) ContactSite {
     Vec3 force{0.0};   // on the tissue [N]
     double limit = 0;  // slip along the surface up to which friction is a spring in this call; 0: none [m]
     bool isTie = false;
+    float compressible = 0;  // Lacking::compressible
 
     Vec3 rest{0.0};
     Vec3 slip{0.0};          // how far the tool went on since it took hold of the point, while they touch [m]
@@ -100,7 +101,7 @@ struct alignas(64) ContactSite {
     double stretch = 0;       // of its area at the end of the last call, see StretchAt; 0: not known
     std::uint32_t point = 0;  // index of the surface point
     float area = 0;           // of the surface that it stands for, at rest [m^2]
-    float lacks = 1;          // `more` of resolvedShare()
+    float lacks = 1;          // Lacking::times
     float resolved = 1;       // fraction of its stiffness that wider cells leave it
     float stiffer = 1;        // by which its tissue had stiffened at the end of the last call, see StretchAt
     float indented = 0;       // E / (1 - nu^2) of its tissue at rest, no more than the contact is as stiff as [Pa]
@@ -170,9 +171,11 @@ double radiusOfPatch(const ElasticTool& tool, double load, double indented, doub
 /// Whether a tool's surface with this normal, a unit vector out of it, is a part of the spheres at its ends: along its side
 /// normals have the angle of its taper to its axis. All of a ball is.
 bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept;
-/// True while that is so small that each surface point is quartered.
+/// Into how many pieces along each of two edges a surface point is divided while that is small: points of a small patch are
+/// then as dense as this, wherever in the cells the surface lies.
 /// @param spacing  of the finest cells [m]
-bool touchesLittle(const ElasticTool& tool, double spacing) noexcept;
+/// @param edge     ElasticBody::pieceEdge
+int piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept;
 
 /// How many surface points tools may touch at once whose surface, three cells around them included, is `area` [m^2]: of the
 /// body both sides, as densely as its points lie, and not more than it has. At least `least`.
@@ -226,32 +229,40 @@ private:
     double modulus_ = 1;
 };
 
-/// How far between nodes a place is: over the edges of a cell along the surface sums of b = f (1 - f) and of b^2, f the
-/// place along one, 0 to 1. The defaults are their means over all places.
+/// How far between nodes a place is, by b = f (1 - f) along both edges of a cell that lie along the surface, f the place
+/// along one, 0 to 1. The defaults are the means over all places.
 struct Between {
-    double b = 1.0 / 3.0;
-    double square = 1.0 / 15.0;
+    double sum = 1.0 / 3.0;       // of both
+    double square = 1.0 / 15.0;   // sum of both squares
+    double product = 1.0 / 36.0;  // of both
 };
 /// Of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat.
 Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
+
+/// By what cells around a point lack other compliance than those of the finest level that are full of soft tissue.
+struct Lacking {
+    double times = 1;         // as much
+    double compressible = 0;  // by how much Poisson's ratio is under softPoisson [-]
+    double sliver = 0;        // SurfacePoint::sliver
+};
 
 /// Fraction of the contact's stiffness that a point has under a patch of radius a on cells of side h.
 ///
 /// Cells do not give way under a patch smaller than themselves as tissue does, least in the middle between nodes. What they
 /// lack there is a compliance c h / E per area:
 ///
-///     c = m + g (b - 1/3) + q (b^2 - 1/15)
+///     c = m + g (sum - 1/3) + q (square - 1/15) + x (product - 1/36)
 ///     share = 1 / (1 + 20 c)
 ///
-/// m, g and q are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49)
-/// needs on grids shifted along the surface; `palpate accuracy --verify` has the errors that are left.
+/// m, g, q and x are functions of a / h; all end at 1.75. They are what a ball on a half-space (Hertz 1882; nu 0.47) needs
+/// on grids shifted along the surface and across it; `palpate accuracy --verify` has the errors that are left.
 ///
-/// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance; tissue with nu
-/// under 0.45 lacks 1 + 4.2 (0.45 - nu) times as much of 1 / 2.9 mu, by the same measurements at nu 0, 0.2 and 0.35.
+/// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance. Tissue with nu
+/// under 0.45 lacks 0.62 (0.45 - nu) h / E more, where E is 2.9 mu, and less than that under a quarter of a cell; its g, q
+/// and x are 1 + 1.2 (0.45 - nu) times as large: by the same measurements at nu 0, 0.2 and 0.35.
 /// @param radiusInCells  in cells of its window
 /// @param across  betweenNodes() of the tool
-/// @param more  times as much compliance as this
-double resolvedShare(double radiusInCells, const Between& across, double more = 1.0) noexcept;
+double resolvedShare(double radiusInCells, const Between& across, const Lacking& lacking = {}) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

@@ -55,11 +55,12 @@ bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
         return false;
     }
     const double spacing = stack_.body().levels.front().nodes.spacing, far = drift * spacing;
+    const double edge = stack_.body().pieceEdge;
     for (std::size_t i = 0; i < foundFor_.size(); ++i) {
         const auto& now = tools[i].shape;
-        const auto& [then, isQuartered] = foundFor_[i];
+        const auto& [then, pieces] = foundFor_[i];
         if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
-            now.radiusB != then.radiusB || isQuartered != touchesLittle(tools[i], spacing)) {
+            now.radiusB != then.radiusB || pieces != piecesUnder(tools[i], spacing, edge)) {
             return false;
         }
     }
@@ -101,7 +102,7 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
                               std::span(sites_).first(room));
         foundFor_.clear();
         for (const ElasticTool& tool : load.tools) {
-            foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
+            foundFor_.push_back({tool.shape, piecesUnder(tool, spacing, stack_.body().pieceEdge)});
         }
     }
     siteCount_ = touching_ + findTies(stack_.body(), stack_.windows(), load.ties, std::span(sites_).subspan(touching_));
@@ -167,7 +168,7 @@ void Elastic::spreadPressure() noexcept
             patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
             const double deep = glm::length(tool.pushed) / tool.shape.widest();  // [radii]
             const double small = std::min(smallTool * grid.spacing / tool.shape.widest(), 1.0);
-            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + small * small * deep) : 1.0;
+            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + 0.6 * small * small * deep) : 1.0;
             confined = byForce > byDepth ? std::pow(byForce / byDepth, std::max(1.0 - deep, 0.0)) : 1.0;
             across = betweenNodes(grid, tool);
             most = stiffestPerArea(tool);
@@ -177,7 +178,9 @@ void Elastic::spreadPressure() noexcept
         const Stretch now = volume::isSmall(options_.law) ? Stretch{}
                             : s.stretch > 0.0             ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
                                                           : stretchAt(s);
-        const double share = resolvedShare(patch, across, lessDeep * static_cast<double>(s.lacks));
+        const double sliver = s.level == 0 ? static_cast<double>(body.points[s.point].sliver) : 0.0;
+        const double share = resolvedShare(
+            patch, across, {lessDeep * static_cast<double>(s.lacks), static_cast<double>(s.compressible), sliver});
         s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
         const double bound = most * static_cast<double>(s.area);
         const double atRest = std::max(s.atRest, std::min(confined * s.atRest, bound));

@@ -14,13 +14,13 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double coarse = 0.11;          // area of a surface point that is quartered, in that of a cell's face,
-constexpr double close = 0.3;            // and how far from the tool it may be [cells]
+constexpr double slight = 0.02;     // area of a surface point that is not worth dividing, in that of its sub-cell's face
+constexpr double close = 0.3;       // how far from a tool points are divided [cells],
+constexpr double smallPatch = 1.1;  // and how far from its middle where they are divided finely [cells]
 constexpr double lengthRounding = 1e-6;  // of a rod, in cells
 constexpr double otherTissue = 1.25;     // times as stiff as the softest along a ring of a rod
 constexpr double endless = 1.0;          // length of a rod [m]
 constexpr double shortestRing = 0.13;    // that is halved, in the finest cells
-constexpr double compressible = 4.2;     // how fast compliance that cells lack grows as nu falls
 
 double touchedAtFirst(double radius) noexcept
 {
@@ -44,8 +44,8 @@ void findLacking(const ElasticBody& body, const SurfacePoint& p, ContactSite& si
     const CellLevel& finest = body.levels.front();
     const double uncapped = penalty * youngsModulusOf(p.mu) / finest.nodes.spacing * static_cast<double>(site.area);
     const double kept = site.atRest / uncapped, nu = poissonAt(finest, site.anchor);
-    const double gives = 1.0 + compressible * std::max(0.0, softPoisson - nu);
-    site.lacks = static_cast<float>(1.0 + (std::ldexp(gives, site.level) - 1.0) * kept);
+    site.compressible = static_cast<float>(std::max(0.0, softPoisson - nu) * kept);
+    site.lacks = static_cast<float>(1.0 + (std::ldexp(1.0, site.level) - 1.0) * kept);
     site.indented = static_cast<float>(2.0 * static_cast<double>(p.mu) / (1.0 - nu) * kept);
 }
 
@@ -200,7 +200,8 @@ private:
     void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
                  const SurfaceCell& cell) noexcept
     {
-        const double spacing = body_.levels.front().nodes.spacing;
+        const double spacing = body_.levels.front().nodes.spacing, edge = body_.pieceEdge;
+        const int pieces = piecesUnder(tool, spacing, edge);
         for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
             if (count_ == out_.size()) {
                 return;
@@ -214,33 +215,39 @@ private:
             site.atRest = site.stiffness = siteStiffness(body_, point, tool);
             site.area = point.area;
             const bool added = addIfNear(shape, site);
-            if (added && touchesLittle(tool, spacing) && static_cast<double>(point.area) > coarse * spacing * spacing) {
-                quarterLast(shape);
+            if (added && pieces > 1 && static_cast<double>(point.area) > slight * edge * edge) {
+                divideLast(
+                    shape, pieces,
+                    pieces > 2 ? std::min(close, 0.5 * smallPatch * smallPatch * spacing / tool.shape.widest()) : close);
             }
         }
     }
 
-    // The piece of the surface that was added last as four, where it may soon touch.
-    void quarterLast(const occupancy::ShapeDistance& shape) noexcept
+    // The surface of the sub-cell that was added last as `along` pieces along each of two edges, where it may soon touch.
+    // Other sub-cells, in front of it or behind it, have the rest of the area, and are divided alike.
+    // @param near  how far from the tool [cells]
+    void divideLast(const occupancy::ShapeDistance& shape, int along, double near) noexcept
     {
         const ContactSite whole = out_[count_ - 1];
-        if (!isNear(shape, whole, close * body_.levels.front().nodes.spacing)) {
+        if (!isNear(shape, whole, near * body_.levels.front().nodes.spacing)) {
             return;
         }
         --count_;
         const SurfacePoint& point = body_.points[whole.point];
         const Vec3 normal(point.normal);
-        const double quarter = 0.25 * std::sqrt(static_cast<double>(point.area));
-        const Vec3 one = quarter * acrossOf(normal), other = glm::cross(normal, one);
-        for (const Vec3& off : {-one - other, one - other, other - one, one + other}) {
+        const Vec3 one = body_.pieceEdge / along * acrossOf(normal), other = glm::cross(normal, one);
+        const int count = along * along;
+        const double first = 0.5 - 0.5 * along;
+        for (int i = 0; i < count; ++i) {
+            const Vec3 off = (i % along + first) * one + (i / along + first) * other;
             if (count_ == out_.size()) {
                 return;
             }
             ContactSite& site = out_[count_] = whole;
             site.rest += off;
             site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
-            site.atRest = site.stiffness = 0.25 * whole.atRest;
-            site.area = 0.25F * whole.area;
+            site.atRest = site.stiffness = whole.atRest / count;
+            site.area = whole.area / static_cast<float>(count);
             addIfNear(shape, site);
         }
     }
