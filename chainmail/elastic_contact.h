@@ -242,7 +242,7 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
 /// By what cells around a point lack other compliance than those of the finest level that are full of soft tissue.
 struct Lacking {
     double times = 1;         // as much
-    double compressible = 0;  // by how much Poisson's ratio is under softPoisson [-]
+    double compressible = 0;  // by how much Poisson's ratio is under 0.47 [-]
     double sliver = 0;        // SurfacePoint::sliver
 };
 
@@ -258,8 +258,8 @@ struct Lacking {
 /// on grids shifted along the surface and across it; `palpate accuracy --verify` has the errors that are left.
 ///
 /// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance. Tissue with nu
-/// under 0.45 lacks 0.62 (0.45 - nu) h / E more, where E is 2.9 mu, and less than that under a quarter of a cell; its g, q
-/// and x are 1 + 1.2 (0.45 - nu) times as large: by the same measurements at nu 0, 0.2 and 0.35.
+/// under 0.47 lacks 0.6 (0.47 - nu) h / E more, where E is 2.9 mu, and less than that under a quarter of a cell; its g, q
+/// and x are 1 + 1.2 (0.47 - nu) times as large: by the same measurements at nu 0, 0.2 and 0.35.
 /// @param radiusInCells  in cells of its window
 /// @param across  betweenNodes() of the tool
 double resolvedShare(double radiusInCells, const Between& across, const Lacking& lacking = {}) noexcept;

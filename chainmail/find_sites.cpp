@@ -21,6 +21,7 @@ constexpr double lengthRounding = 1e-6;  // of a rod, in cells
 constexpr double otherTissue = 1.25;     // times as stiff as the softest along a ring of a rod
 constexpr double endless = 1.0;          // length of a rod [m]
 constexpr double shortestRing = 0.13;    // that is halved, in the finest cells
+constexpr double givesAsFitted = 0.47;   // Poisson's ratio of the tissue that resolvedShare() is fitted to
 
 double touchedAtFirst(double radius) noexcept
 {
@@ -44,7 +45,7 @@ void findLacking(const ElasticBody& body, const SurfacePoint& p, ContactSite& si
     const CellLevel& finest = body.levels.front();
     const double uncapped = penalty * youngsModulusOf(p.mu) / finest.nodes.spacing * static_cast<double>(site.area);
     const double kept = site.atRest / uncapped, nu = poissonAt(finest, site.anchor);
-    site.compressible = static_cast<float>(std::max(0.0, softPoisson - nu) * kept);
+    site.compressible = static_cast<float>(std::max(0.0, givesAsFitted - nu) * kept);
     site.lacks = static_cast<float>(1.0 + (std::ldexp(1.0, site.level) - 1.0) * kept);
     site.indented = static_cast<float>(2.0 * static_cast<double>(p.mu) / (1.0 - nu) * kept);
 }
