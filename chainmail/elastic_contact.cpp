@@ -40,6 +40,8 @@ constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
                                              {2.0, 0.0, 0.0, 0.0, 0.0}}};
 // Cosine between a capsule and its way up to which it lies: what is small then is a strip, of many points.
 constexpr double steep = 0.7;
+// Depth in radii from which on the surface lies around a small tool: points as dense as its cells make them too stiff there.
+constexpr double deep = 0.5;
 // Radius of a patch, in cells, up to which surface points lie as close to each other as that, in cells.
 struct Closeness {
     double radius, apart;
@@ -80,7 +82,8 @@ int piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
     }
     const Vec3 axis = tool.shape.b - tool.shape.a;
     const bool lies = std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
-    const double patch = radiusOfPatch(tool) / spacing;
+    const bool isDeep = glm::length(tool.pushed) > deep * tool.shape.widest();
+    const double patch = isDeep ? closeness.back().radius : radiusOfPatch(tool) / spacing;
     const auto* const found = std::find_if(closeness.begin() + (lies ? 1 : 0), closeness.end(),
                                            [&](const Closeness& c) { return patch < c.radius; });
     return found == closeness.end() ? 1 : static_cast<int>(std::ceil(edge / (found->apart * spacing)));
