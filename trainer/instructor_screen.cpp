@@ -1,6 +1,7 @@
 #include <trainer/charts.h>
 #include <trainer/widgets.h>
 
+#include <base/printable.h>
 #include <base/said.h>
 
 #include <fmt/format.h>
@@ -222,7 +223,9 @@ Errand drawChoiceOfGroups(State& state)
 
 std::string spreadInWords(const Spread& s, int decimals)
 {
-    const auto number = [decimals](double v) { return std::isfinite(v) ? said("{:.{}Lf}", v, decimals) : "-"; };
+    const auto number = [decimals](double v) {
+        return std::isfinite(v) ? said("{:.{}Lf}", base::printable(v, decimals), decimals) : "-";
+    };
     return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
 }
 
@@ -252,7 +255,7 @@ void drawDifferences(const Comparison& c)
             words(spreadInWords(m.groups[g], m.decimals), groupColour(g));
         }
         ImGui::TableNextColumn();
-        words(m.effect ? said("{:+.2Lf}", *m.effect) : "-");
+        words(m.effect ? said("{:+.2Lf}", base::printable(*m.effect, 2)) : "-");
         ImGui::TableNextColumn();
         drawSpreads(m, 12 * em, 1.8F * em);
     }
