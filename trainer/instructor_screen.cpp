@@ -135,7 +135,7 @@ Errand drawKept(State& state)
         errand = Errand::seeKept;
     }
     ImGui::Spacing();
-    words(tr("Global rating, 1 to 5"));
+    words(tr("Global rating, 1 (poor) to 5 (excellent)"));
     for (int rating = 0; rating <= 5; ++rating) {
         ImGui::PushID(rating);
         ImGui::RadioButton(rating == 0 ? tr("none") : std::to_string(rating).c_str(), &i.rating, rating);
@@ -293,7 +293,8 @@ Errand drawGroups(State& state)
 
 Errand drawInstructor(State& state)
 {
-    roomForTwo() ? heading(tr("What are they doing?")) : void();
+    const char* const headings[]{tr("What are they doing?"), tr("What have they done?"), tr("How do groups differ?")};
+    roomForTwo() ? heading(headings[static_cast<std::size_t>(state.instructor.page)]) : void();
     int page = static_cast<int>(state.instructor.page);
     const std::pair<const char*, InstructorPage> pages[]{{tr("Sessions that run"), InstructorPage::live},
                                                          {tr("Sessions that were kept"), InstructorPage::sessions},
@@ -308,7 +309,7 @@ Errand drawInstructor(State& state)
     }
     const bool turned = page != static_cast<int>(state.instructor.page);
     state.instructor.page = static_cast<InstructorPage>(page);
-    turned ? state.notice.clear() : void();
+    turned ? (state.notice.clear(), state.told.clear()) : void();
     beginPart("page", 0, -3.4F * ImGui::GetFontSize());
     Errand errand = Errand::none;
     switch (state.instructor.page) {
