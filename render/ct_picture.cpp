@@ -149,7 +149,7 @@ void CtPicture::label(Canvas& canvas, Point2 at, const std::string& words, doubl
     canvas.text(at, words, size, white, align, true);
 }
 
-constexpr double leastLabelled = 8, leastScaled = 14;  // widths of a scan [fonts]
+constexpr double leastLabelled = 6, leastScaled = 12;  // widths of a scan [fonts]
 
 void CtPicture::drawLabels(Canvas& canvas, double font) const
 {

@@ -355,9 +355,10 @@ Notice placeOfNotice(const State& state)
     const bool inFoot = !rollsAsOne() && !foot.stacked && free > 24 * em;
     place.left = inFoot ? side + button(foot.back) : side;
     place.wide = inFoot ? free : size.x - 2 * side;
-    place.bottom =
-        inFoot ? size.y - 0.3F * em : size.y - (rollsAsOne() ? heightOf(foot) + 2 * style.WindowPadding.y : 3 * em);
     place.high = ImGui::CalcTextSize(place.text.c_str(), nullptr, false, place.wide - 2 * side).y + 0.6F * em;
+    const float beside = size.y - 3 * em + 0.5F * (ImGui::GetFrameHeight() + place.high);  // in the middle of the buttons
+    const float above = size.y - (rollsAsOne() ? heightOf(foot) + 2 * style.WindowPadding.y : 3 * em);
+    place.bottom = inFoot ? std::min(beside, size.y - 0.3F * em) : above;
     return place;
 }
 
