@@ -106,7 +106,8 @@ function draw(id, chart) {
   const place = document.getElementById(id);
   if (!place) return;
   if (chart.scatter) {
-    charts.push({ plot: scatter(place, chart, axis), place });
+    const plot = scatter(place, chart, axis);
+    charts.push({ plot, place, height: plot.height });
     nameLines(place, chart);
     return;
   }
@@ -138,7 +139,7 @@ function draw(id, chart) {
     hooks: { draw: [(u) => { horizontal(u, chart.lines || []); vertical(u, chart.events ? data.events : []); }] },
   };
   const plot = new uPlot(options, chart.columns, place);
-  charts.push({ plot, place });
+  charts.push({ plot, place, height: plot.height });
   nameLines(place, chart);
 }
 
@@ -152,10 +153,9 @@ function drawAll() {
 
 drawAll();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
-const fit = (widthOf) => {
-  for (const { plot, place } of charts) plot.setSize({ width: widthOf(place), height: plot.height });
+const fitWindow = () => {
+  for (const { plot, place, height } of charts) plot.setSize({ width: Math.max(place.clientWidth, 240), height });
 };
-const fitWindow = () => fit((place) => Math.max(place.clientWidth, 240));
 let resized = 0;
 addEventListener("resize", () => {
   cancelAnimationFrame(resized);
@@ -163,13 +163,16 @@ addEventListener("resize", () => {
 });
 
 // A page of paper is narrower than most windows, always light, and nobody can open anything on it.
-const paper = 680, halfPaper = 330;
+const paper = 680, halfPaper = 330, lowOnPaper = 165;
 let opened = [];
 addEventListener("beforeprint", () => {
   document.documentElement.classList.add("printing");
   opened = [...document.querySelectorAll("details:not([open])")];
   for (const one of opened) one.open = true;
-  fit((place) => (place.closest(".charts") ? halfPaper : paper));
+  for (const { plot, place, height } of charts) {
+    const half = place.closest(".charts");
+    plot.setSize({ width: half ? halfPaper : paper, height: half ? lowOnPaper : height });
+  }
 });
 addEventListener("afterprint", () => {
   document.documentElement.classList.remove("printing");
