@@ -75,8 +75,9 @@ void checkCurriculum(const CurriculumArguments& o)
     fmt::print("{}: {}\n", c.id, c.title);
     int number = 0;
     for (const training::Exercise& e : c.exercises) {
-        fmt::print("  {}. {} ({}), case {}; {} of the last {}{} sessions:\n", ++number, e.title, e.id, e.caseId,
-                   e.gate.pass, e.gate.of, e.gate.testOnly ? " test" : "");
+        fmt::print("  {}. {} ({}), case {}; {}{} session{}:\n", ++number, e.title, e.id, e.caseId,
+                   e.gate.of == 1 ? "the last" : fmt::format("{} of the last {}", e.gate.pass, e.gate.of),
+                   e.gate.testOnly ? " test" : "", e.gate.of == 1 ? "" : "s");
         for (const training::Level& level : e.gate.levels) {
             fmt::print("       {}\n", levelInWords(level));
         }

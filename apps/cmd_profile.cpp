@@ -182,7 +182,8 @@ void addProfile(CLI::App& app)
     CLI::App* const noted = sub("note", "Set an instructor's note and global rating of a session", true);
     noted->add_option("SESSION", o->session, "Number of the session (palpate progress NAME)")->required();
     noted->add_option("--text", o->note, "Text of the note (default: empty)")->expected(0, 1);
-    noted->add_option("--rating", o->rating, "Global rating, 1 to 5 (default: 0, none)")->check(CLI::Range(0, 5));
+    noted->add_option("--rating", o->rating, "Global rating, 1 (poor) to 5 (excellent) (default: 0, none)")
+        ->check(CLI::Range(0, 5));
     noted->final_callback([o] { note(*o); });
 }
 

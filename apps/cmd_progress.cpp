@@ -109,6 +109,22 @@ report::ScoredGroup scored(const PeopleGroup& group)
     return out;
 }
 
+std::string levelInWords(const ExerciseProgress& e)
+{
+    if (e.sessions.empty()) {
+        return "no session yet";
+    }
+    const std::string count = fmt::format("{:>12}, ", base::counted(e.sessions.size(), "session"));
+    switch (e.gate.recentTried) {
+        case 0:
+            return count + "no test yet";
+        case 1:
+            return count + (e.gate.recentMet == 1 ? "the last one at the level" : "the last one not at the level");
+        default:
+            return count + fmt::format("{} of the last {} at the level", e.gate.recentMet, e.gate.recentTried);
+    }
+}
+
 void printPerson(const PersonProgress& p)
 {
     fmt::print("{} ({})\n", p.person.name, base::counted(p.sessions.size(), "session"));
@@ -121,8 +137,7 @@ void printPerson(const PersonProgress& p)
                                       : &e == next  ? "next"
                                       : e.available ? "open"
                                                     : "locked";
-            fmt::print("    {:<40} {:<15} {:>12}, {} of the last {} at the level\n", e.exercise->title, state,
-                       base::counted(e.sessions.size(), "session"), e.gate.recentMet, e.gate.recentTried);
+            fmt::print("    {:<40} {:<15} {}\n", e.exercise->title, state, levelInWords(e));
         }
         fmt::print("  {}\n", next == nullptr ? "all exercises are reached"
                                              : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));

@@ -7,6 +7,7 @@
 #include <command/interrupted.h>
 #include <command/json.h>
 #include <render/keys.h>
+#include <render/tryout.h>
 #include <render/viewer.h>
 
 #include <fmt/format.h>
@@ -157,7 +158,8 @@ void run(Words& words, palpate::render::ViewerOptions& options)
 {
     readSize(words.size, options);
     applyLook(words, options);
-    options.title = palpate::base::tr(options.title);
+    const bool tryout = options.tryout > 0 && options.title.empty();
+    options.title = tryout ? palpate::render::Tryout::heading() : palpate::base::tr(options.title);
     palpate::base::checkOutputs({words.json, words.timeline, options.movie}, {words.replay, words.ghost, options.result});
     std::optional<palpate::apps::ReplayPlayer> player;
     if (!words.replay.empty()) {

@@ -22,6 +22,8 @@ namespace {
 using channel::vec;
 
 constexpr auto air = static_cast<float>(base::ctNumberOfAir), steel = static_cast<float>(base::ctNumberOfSteel);  // [HU]
+// What a core leaves: half blood, half air, assumed.
+constexpr float inHole = 0.5F * (55 + air);    // [HU]
 constexpr int lowest = -1024, highest = 3071;  // of 12 bits
 constexpr double sharpness = 1.0e-3;           // full width at half maximum of a point in the slice [m], assumed
 constexpr double widest = 0.256;               // of the picture [m]
@@ -161,6 +163,23 @@ float Scanner::numberBeside(const channel::Deformation& body, glm::ivec3 node) c
     return base::holds(size, there) && !isBody(there) ? outside(there) : air;
 }
 
+// How much of a pixel around a place at rest cores have left empty.
+float Scanner::shareOfHoles(const channel::State& state, const channel::Deformation& body, glm::dvec3 rest,
+                            double pixel) const noexcept
+{
+    double share = 0;
+    for (std::size_t i = 0; i < std::min<std::size_t>(state.holes, state.hole.size()); ++i) {
+        const auto& [begin, end] = state.hole[i];
+        const glm::dvec3 from(begin[0], begin[1], begin[2]), way = glm::dvec3(end[0], end[1], end[2]) - from;
+        const double square = glm::dot(way, way), along = glm::dot(rest - from, way);
+        if (!(square > 0) || along < 0 || along > square)
+            continue;
+        const double beside = glm::distance(rest, from + along / square * way);
+        share = std::max(share, std::clamp((scenery_.holeRadius - beside) / pixel + 0.5, 0.0, 1.0));
+    }
+    return share > 0 && (body.restLabel(rest) & channel::rowBits) != 0 ? static_cast<float>(share) : 0.0F;
+}
+
 void Scanner::addPlane(const channel::State& state, const channel::Deformation& body, Plane& plane) const
 {
     const Scan& f = plane.frame;
@@ -176,7 +195,9 @@ void Scanner::addPlane(const channel::State& state, const channel::Deformation& 
         glm::vec3 shift(0);
         for (int x = 0; x < f.side; ++x) {
             const glm::dvec3 p(f.corner.x + x * f.pixel, f.corner.y + y * f.pixel, plane.z);
-            float hu = numberAt(body, body.rest(p, shift));
+            const glm::dvec3 rest = body.rest(p, shift);
+            float hu = numberAt(body, rest);
+            hu += shareOfHoles(state, body, rest, f.pixel) * (inHole - hu);
             if (metal && p.x > low.x && p.y > low.y && p.x < high.x && p.y < high.y) {
                 const double fraction = std::clamp((radius - distanceToNeedle(needle, p)) / f.pixel + 0.5, 0.0, 1.0);
                 hu += static_cast<float>(fraction) * (steel - hu);

@@ -61,6 +61,8 @@ private:
     float numberAt(const channel::Deformation& body, glm::dvec3 rest) const noexcept;
     float codeAt(glm::ivec3 node) const noexcept;
     float numberBeside(const channel::Deformation& body, glm::ivec3 node) const noexcept;
+    float shareOfHoles(const channel::State& state, const channel::Deformation& body, glm::dvec3 rest,
+                       double pixel) const noexcept;
     void addPlane(const channel::State& state, const channel::Deformation& body, Plane& plane) const;
     std::vector<float> slice(const channel::State& state, const channel::Deformation& body, const Scan& frame,
                              double height) const;

@@ -1,5 +1,6 @@
 #include <haptics/measures.h>
 
+#include <base/printable.h>
 #include <base/words.h>
 
 #include <fmt/format.h>
@@ -160,7 +161,9 @@ LabelledValues describeMeasures(const Score& score)
         const double value = m.value(score);
         const bool missing = !std::isfinite(value) || (m.listed == Listed::ifFired && score.passes == 0);
         const char* const space = *m.unit == 0 ? "" : " ";
-        lines.emplace_back(m.label, missing ? "-" : fmt::format("{:.{}f}{}{}", value, m.decimals, space, m.unit));
+        lines.emplace_back(
+            m.label,
+            missing ? "-" : fmt::format("{:.{}f}{}{}", base::printable(value, m.decimals), m.decimals, space, m.unit));
     }
     return lines;
 }

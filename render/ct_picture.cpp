@@ -149,13 +149,20 @@ void CtPicture::label(Canvas& canvas, Point2 at, const std::string& words, doubl
     canvas.text(at, words, size, white, align, true);
 }
 
+constexpr double leastLabelled = 6, leastScaled = 12;  // widths of a scan [fonts]
+
 void CtPicture::drawLabels(Canvas& canvas, double font) const
 {
     for (std::size_t k = 0; k < scan_->hu.size(); ++k) {
         const Area t = tile(k);
+        // A label that would hide most of its scan is left out.
+        if (t.width < leastLabelled * font)
+            continue;
         label(canvas, {t.x + 0.4 * font, t.y + 0.4 * font}, base::said("z {:.1Lf} mm", 1e3 * scan_->height[k]), 0.8 * font);
     }
     const Area large = tile(scan_->hu.size() / 2);
+    if (large.width < leastScaled * font)
+        return;
     const double high = large.y + 0.5 * large.height;
     label(canvas, {large.x + 0.4 * font, high}, tr("R"), font);
     label(canvas, {large.x + large.width - 0.4 * font, high}, tr("L"), font, Align::right);

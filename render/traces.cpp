@@ -131,9 +131,8 @@ void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const cha
         std::sort(order.begin() + 1, order.end(), [&](std::size_t a, std::size_t b) {
             return history.moments.back().distance[a] < history.moments.back().distance[b];
         });
-    order.resize(std::min(count, shown));
-    std::sort(order.begin(), order.end());
-    constexpr double top = 40;  // [mm]
+    order.resize(std::min(count, shown));  // the nearest first: a narrow legend has no room for the last
+    constexpr double top = 40;             // [mm]
     const Diagram d = frameOf(canvas, area, font, base::tr("DISTANCE FROM THE TIP"), nowOf(history), top, "mm");
     std::vector<Curve> curves;
     for (const std::size_t s : order)

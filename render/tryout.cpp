@@ -12,6 +12,11 @@
 namespace palpate::render {
 using base::marked;
 
+const char* Tryout::heading()
+{
+    return base::tr("Trying the tool");
+}
+
 constexpr int steps = 6;
 constexpr double across = 5e-3, along = 8e-3;  // of the tip, that were meant [m]
 

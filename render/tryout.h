@@ -15,6 +15,8 @@ public:
     /// @param seconds  of the session, for the time that is left [s]
     explicit Tryout(double seconds) : seconds_(seconds) {}
 
+    /// What a window shows above it: its body is of no interest.
+    static const char* heading();
     /// @param held  the dead-man switch of mouse or keys
     Coaching see(const channel::Scenery& scenery, const channel::State& state, bool held);
 

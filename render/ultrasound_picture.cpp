@@ -7,6 +7,7 @@
 
 #include <base/outputs.h>
 #include <render/deformation.h>
+#include <render/header.h>
 #include <render/overlay.h>
 #include <ultrasound/stored_image.h>
 
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <string_view>
 #include <tuple>
 
 namespace palpate::render {
@@ -95,6 +97,11 @@ void UltrasoundPicture::convert(const ultrasound::BeamImage* image)
                     &pixels_.grey[static_cast<std::size_t>(y) * row], row);
 }
 
+static const char* nothingYet()
+{
+    return base::tr("no picture yet: nothing was stored");
+}
+
 void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact, bool told)
 {
     if (!scan_)
@@ -113,10 +120,13 @@ void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& aroun
     actor_->SetPosition(around.x, around.y);
     actor_->SetVisibility(1);
     if (!image) {
-        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, base::tr("ultrasound: preparing the tissue"),
-                    font, grey, Align::centre);
+        const double middle = area.x + 0.5 * area.width, high = area.y + 0.5 * area.height;
+        canvas.text({middle, high}, base::tr("ultrasound: preparing the tissue"), font, grey, Align::centre);
+        canvas.text({middle, high - lineHeight * font}, message_, font, amber, Align::centre);
         return;
     }
+    if (message_ == nothingYet())
+        message_.clear();
     if (!told)
         return;
     drawScale(canvas, *image, font);
@@ -168,19 +178,43 @@ void UltrasoundPicture::drawScale(Canvas& canvas, const ultrasound::BeamImage& i
                 true);
 }
 
+constexpr double leastMargin = 6;  // for the settings to stand in it [fonts]
+
+// In lines of at most this width; what three blanks separate is apart.
+static std::vector<std::string> linesBeside(const Canvas& canvas, const std::string& words, double size, bool bold,
+                                            double width)
+{
+    constexpr std::string_view apart = "   ";
+    std::vector<std::string> lines;
+    for (std::size_t from = 0, end = 0; end != std::string::npos; from = end + apart.size()) {
+        end = words.find(apart, from);
+        const auto part = wrapped(canvas, words.substr(from, end - from), size, bold, width);
+        lines.insert(lines.end(), part.begin(), part.end());
+    }
+    return lines;
+}
+
 void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage& image, double font) const
 {
     const ultrasound::Settings& s = image.settings;
     const double x = area_.x + 0.5 * font, row = lineHeight * font;
     double y = area_.y + 0.4 * font;
-    const auto words = [&](const std::string& all, const Colour& colour, bool bold = false) {
-        const std::string what = shortened(canvas, all, 0.9 * font, bold, area_.width - font);
+    const double half =
+        static_cast<double>(ultrasound::Beam(image.transducer, s).halfWidth() * layout(image).pixelsPerMetre());
+    const double margin = 0.5 * area_.width - half - 1.5 * font;  // left of the picture
+    const bool beside = margin > leastMargin * font;
+    const auto line = [&](const std::string& what, const Colour& colour, bool bold) {
         const double wide = canvas.widthOf(what, 0.9 * font, bold);
         canvas.cover({x, y}, {wide, 0.9 * font});  // numbers of the scale
         // Speckle is as bright as the words.
         canvas.rectangle({x - 0.4 * font, y - 0.35 * font}, {wide + 0.8 * font, row}, cardColour, 0.75);
         canvas.text({x, y}, what, 0.9 * font, colour, Align::left, bold);
         y += row;
+    };
+    const auto words = [&](const std::string& all, const Colour& colour, bool bold = false) {
+        const auto lines = beside ? linesBeside(canvas, all, 0.9 * font, bold, margin) : std::vector{all};
+        for (std::size_t i = lines.size(); i-- > 0;)
+            line(shortened(canvas, lines[i], 0.9 * font, bold, area_.width - font), colour, bold);
     };
     std::string sliders;
     for (const float slider : s.tgc)
@@ -346,8 +380,10 @@ void UltrasoundPicture::endCaliper()
 bool UltrasoundPicture::store(const std::filesystem::path& folder)
 {
     const ScanThread::Image image = shown();
-    if (!image)
+    if (!image) {
+        message_ = nothingYet();
         return false;
+    }
     constexpr int width = 800, height = 600;
     ultrasound::BeamImage stored = *image;
     stored.mirrored = mirrored_;

@@ -4,6 +4,7 @@
 #include <base/folds.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/printable.h>
 #include <base/round_step.h>
 #include <base/utf8.h>
 #include <report/html.h>
@@ -33,7 +34,7 @@ std::vector<double> rounded(std::vector<double> values, const haptics::Measure& 
 {
     const double unit = std::pow(10.0, decimalsOf(measure));
     for (double& v : values) {
-        v = std::round(v * unit) / unit + 0.0;  // no negative zero
+        v = base::printable(std::round(v * unit) / unit, decimalsOf(measure));
     }
     return values;
 }
@@ -48,7 +49,7 @@ std::string shortened(const std::string& name, std::size_t most)
             out += c;
         }
     }
-    return characters <= most ? name : out + ".";
+    return characters <= most ? name : out + "…";
 }
 
 bool without(const std::vector<double>& values)
@@ -110,7 +111,7 @@ std::string axisBelow(const Range& range, double finest, double y, const auto& x
         out += fmt::format(
             "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" class=\"axis\"/><text x=\"{0:.1f}\" "
             "y=\"{3:.1f}\" text-anchor=\"middle\">{4:.{5}f}</text>",
-            x(at), y, y + 4, y + 15, at + 0.0, decimals);
+            x(at), y, y + 4, y + 15, base::printable(at, decimals), decimals);
     }
     return out;
 }
@@ -131,9 +132,8 @@ std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure
     double y = rowHeight / 2;
     for (std::size_t i = 0; i < groups.size(); ++i) {
         const auto values = rounded(valuesOf(groups[i], measure), measure);
-        const std::string name = shortened(groups[i].name, 14);
-        out += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", nameWidth - 6, y + 4,
-                           escape(name));
+        out += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}<title>{}</title></text>", nameWidth - 6,
+                           y + 4, escape(shortened(groups[i].name, 14)), escape(groups[i].name));
         if (values.empty()) {
             y += rowHeight;
             continue;
@@ -170,11 +170,10 @@ std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& 
     }
     for (std::size_t b = 1; b < groups.size(); ++b) {
         const auto delta = effectSize(groups[0], groups[b], measure);
-        deltas +=
-            fmt::format("<div>over {}: {}</div>", escape(groups[b].name), delta ? fmt::format("{:+.2f}", *delta) : "-");
+        deltas += fmt::format("<div>over {}: {}</div>", escape(groups[b].name), deltaText(delta));
     }
-    return fmt::format("<tr><th>{}</th><td class=\"key\">{}</td><td>{}</td><td class=\"n\">{}</td></tr>", titleOf(measure),
-                       medians, strip(groups, measure), deltas);
+    return fmt::format("<tr><th>{}</th><td class=\"key\">{}</td><td>{}</td><td class=\"n words\">{}</td></tr>",
+                       titleOf(measure), medians, strip(groups, measure), deltas);
 }
 
 }  // namespace
@@ -260,8 +259,8 @@ std::string groupsPart(const std::vector<ScoredGroup>& groups)
         " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
         "are small, medium and large. It needs two sessions with a value in each group; values that are the "
         "same as printed count as equal.</p></div></header><section class=\"card\"><div class=\"scroll\"><table "
-        "class=\"plain progress\"><thead><tr><th>Measure</th>"
-        "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n\">" +
+        "class=\"plain progress groups\"><thead><tr><th>Measure</th>"
+        "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n words\">" +
         (groups.size() > 1 ? "Cliff's delta of " + escape(groups[0].name) : "") + "</th></tr></thead><tbody>" + rows +
         "</tbody></table></div>";
     if (!same.empty()) {

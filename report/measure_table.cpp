@@ -1,5 +1,6 @@
 #include <report/measure_table.h>
 
+#include <base/printable.h>
 #include <haptics/measures.h>
 
 #include <fmt/format.h>
@@ -11,7 +12,12 @@ namespace palpate::report {
 
 std::string cell(double value, int decimals)
 {
-    return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
+    return std::isfinite(value) ? fmt::format("{:.{}f}", base::printable(value, decimals), decimals) : "-";
+}
+
+std::string deltaText(const std::optional<double>& delta)
+{
+    return delta ? fmt::format("{:+.2f}", base::printable(*delta, 2)) : "-";
 }
 
 std::string measureTable(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& columns)
@@ -59,7 +65,7 @@ std::string groupTable(const std::vector<ScoredGroup>& groups)
             columns.emplace_back();
             for (const haptics::Measure& m : haptics::measures()) {
                 const auto delta = effectSize(groups[a], groups[b], m);
-                columns.back().push_back(delta ? fmt::format("{:+.2f}", *delta) : "-");
+                columns.back().push_back(deltaText(delta));
             }
         }
     }

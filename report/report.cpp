@@ -297,10 +297,10 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
                          {"nearest", nearestChart(d, info)}}}};
 
     std::string out = header(d, record, file.string()) + scoreCard(d) + coresCard(d, info);
-    out +=
-        chartCard("forces", "Force against time",
-                  "Basic force of the tissue, additional force that warns, and the total as sent to the hand. Drag to look "
-                  "closer, click twice to see all; a name in the legend hides its line.");
+    out += chartCard(
+        "forces", "Force against time",
+        "Basic force of the tissue, additional force that warns, and the total as sent to the hand. <span "
+        "class=\"hint\">Drag to look closer, click twice to see all; a name in the legend hides its line.</span>");
     out +=
         chartCard("distances", "Distances against time",
                   "From the tip to the target and the vital structures, in the deformed tissue. Dashed lines are where a "

@@ -66,7 +66,7 @@ fs::file_time_type writtenAt(const fs::path& file) noexcept
 
 void openPage(const fs::path& page)
 {
-    if (::access("/usr/bin/xdg-open", X_OK) == 0) {
+    if (fs::exists(page) && ::access("/usr/bin/xdg-open", X_OK) == 0) {
         base::start({{"/usr/bin/xdg-open", page.string()}, {-1, -1, -1}, true});
     }
 }

@@ -1,12 +1,14 @@
 #include <trainer/errands.h>
 
 #include <base/outputs.h>
+#include <base/said.h>
 #include <base/temporary_folder.h>
 #include <base/user_files.h>
 #include <base/words.h>
 #include <trainer/commands.h>
 #include <trainer/film.h>
 #include <trainer/lists.h>
+#include <trainer/pages.h>
 #include <trainer/running.h>
 
 #include <algorithm>
@@ -20,16 +22,7 @@
 namespace palpate::trainer {
 
 namespace fs = std::filesystem;
-using base::tr;
-
-namespace {
-
-const char* opening()
-{
-    return tr("It opens in a window of its own. That may take some seconds.");
-}
-
-}  // namespace
+using base::said, base::tr;
 
 struct Errands::Impl {
     Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to) {}
@@ -39,6 +32,7 @@ struct Errands::Impl {
     {
         one.emplace(programs / program, words, scratch / (log + ".log"));
     }
+    static const char* opening() { return tr("It opens in a window of its own. That may take some seconds."); }
     void startSession(State& state)
     {
         grip.letGo();
@@ -167,14 +161,12 @@ struct Errands::Impl {
     }
     void writeProgress(State& state)
     {
-        const fs::path base = output(base::progressPages(state.person));
-        std::vector<std::string> words = progressWords(state.person);
-        words.insert(words.end(), {"--html", base.string() + ".html", "--csv", base.string() + ".csv", "--xapi",
-                                   base.string() + ".xapi.json"});
-        if (commands.did(words, state.notice)) {
-            state.notice = base.string() + tr(": page (.html), table (.csv), xAPI statements (.xapi.json)");
-            openPage(base.string() + ".html");
+        if (!pages.busy()) {
+            pages.write(programs, progressWords(state.person), output(base::progressPages(state.person)),
+                        scratch / "pages.log");
         }
+        state.notice.clear();
+        state.told = tr("Page, table and xAPI statements are being written ...");
     }
     void loadEverybody(State& state)
     {
@@ -190,7 +182,7 @@ struct Errands::Impl {
         const std::vector<std::string> words{what,       i.watched,    titleOption(i.watchedTitle),          "--watch",
                                              "--layout", "instructor", "--palette=" + state.settings.palette};
         eyes.emplace_back(programs / "palpate-view", words, scratch / ("watch-" + std::to_string(++watched) + ".log"));
-        state.notice = opening();
+        state.told = opening();
     }
     void keepNote(State& state)
     {
@@ -212,14 +204,14 @@ struct Errands::Impl {
             state.notice = tr("Put somebody into each of the two groups.");
             return;
         }
-        const fs::path page = output("groups").replace_extension(".html");
+        const fs::path page = freshFile(output("groups"), ".html");
         if (state.instructor.asPage) {
             words.insert(words.end(), {"--html", page.string()});
         }
         state.notice.clear();
         state.instructor.comparison = comparisonIn(commands.answer(words, state.notice));
         if (state.instructor.asPage && state.notice.empty()) {
-            state.notice = page.string();
+            state.told = said(tr("Written to {}"), page.string());
             openPage(page);
         }
     }
@@ -408,15 +400,21 @@ struct Errands::Impl {
         }
         eyes.remove_if([&](Running& one) {
             const bool ended = one.ended();
-            if (ended && (one.failed() || state.notice == opening())) {
-                state.notice = one.failed() ? one.message() : "";
+            if (ended) {
+                state.notice = one.failed() ? one.message() : state.notice;
+                state.told = state.told == opening() ? "" : state.told;
             }
             changed = changed || ended;
             return ended;
         });
         if (film.ended()) {
-            state.notice = film.take();
+            film.take(state.told, state.notice);
             state.filming = false;
+            changed = true;
+        }
+        if (pages.ended()) {
+            state.told.clear();
+            pages.take(state.told, state.notice);
             changed = true;
         }
         return changed;
@@ -432,6 +430,7 @@ struct Errands::Impl {
     fs::file_time_type profilesRead = writtenAt(profilesFile());  // when the people were
     std::optional<Running> session, devices, replay, push, tryout, expert, live;
     Film film;
+    Pages pages;
     bool ending = false;  // the session was told to end
     fs::file_time_type liveRead;
     std::list<Running> eyes;  // viewers of the instructor
@@ -483,6 +482,7 @@ void Errands::run(Errand errand, State& state)
                                           {Errand::startDebrief, &Impl::debriefAlone}};
     try {
         if (const auto at = all.find(errand); at != all.end()) {
+            state.told.clear();
             ((*impl_).*at->second)(state);
         }
         errand == Errand::keepSettings ? list(state) : void();

@@ -1,5 +1,8 @@
 #include <trainer/film.h>
 
+#include <base/said.h>
+#include <base/words.h>
+
 #include <unistd.h>
 
 #include <system_error>
@@ -26,20 +29,19 @@ void Film::make(const fs::path& programs, const fs::path& record, const std::str
                     std::vector<std::string>{"--replay", record, title, can ? "--movie" : "--offscreen", making_}, log);
 }
 
-std::string Film::take()
+void Film::take(std::string& told, std::string& notice)
 {
     std::error_code failed;
-    std::string said = made_.string();
     if (viewer_->failed()) {
-        said = viewer_->message();
+        notice = viewer_->message();
         fs::remove_all(making_, failed);
     } else {
         fs::remove_all(made_, failed);
         fs::rename(making_, made_, failed);
-        said += failed ? ": " + failed.message() : "";
+        (failed ? notice : told) =
+            failed ? made_.string() + ": " + failed.message() : base::said(base::tr("Written to {}"), made_.string());
     }
     viewer_.reset();
-    return said;
 }
 
 }  // namespace palpate::trainer

@@ -23,9 +23,9 @@ public:
               const std::filesystem::path& log);
     /// Whether one was made and has come to its end.
     bool ended() noexcept { return viewer_ && viewer_->ended(); }
-    /// Its name, or why there is none.
+    /// Says its name in `told`, or in `notice` why there is none.
     /// @pre  it has ended
-    std::string take();
+    void take(std::string& told, std::string& notice);
 
 private:
     std::optional<Running> viewer_;

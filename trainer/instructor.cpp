@@ -1,6 +1,7 @@
 #include <trainer/instructor.h>
 
 #include <base/mapped.h>
+#include <base/printable.h>
 #include <base/said.h>
 #include <trainer/lists.h>
 
@@ -93,7 +94,8 @@ std::optional<std::string> sameInAll(const ComparedMeasure& m, int sessions)
         return {};
     }
     const std::string label = m.unit.empty() ? m.label : m.label + " [" + m.unit + "]";
-    return none ? said(tr("{} without a value"), label) : said("{} {:.{}Lf}", label, all[0], m.decimals);
+    return none ? said(tr("{} without a value"), label)
+                : said("{} {:.{}Lf}", label, base::printable(all[0], m.decimals), m.decimals);
 }
 
 // Medians of counts lie between them: half a pass is not none.

@@ -1,6 +1,7 @@
 #include <trainer/charts.h>
 #include <trainer/widgets.h>
 
+#include <base/printable.h>
 #include <base/said.h>
 
 #include <fmt/format.h>
@@ -134,7 +135,7 @@ Errand drawKept(State& state)
         errand = Errand::seeKept;
     }
     ImGui::Spacing();
-    words(tr("Global rating, 1 to 5"));
+    words(tr("Global rating, 1 (poor) to 5 (excellent)"));
     for (int rating = 0; rating <= 5; ++rating) {
         ImGui::PushID(rating);
         ImGui::RadioButton(rating == 0 ? tr("none") : std::to_string(rating).c_str(), &i.rating, rating);
@@ -222,7 +223,9 @@ Errand drawChoiceOfGroups(State& state)
 
 std::string spreadInWords(const Spread& s, int decimals)
 {
-    const auto number = [decimals](double v) { return std::isfinite(v) ? said("{:.{}Lf}", v, decimals) : "-"; };
+    const auto number = [decimals](double v) {
+        return std::isfinite(v) ? said("{:.{}Lf}", base::printable(v, decimals), decimals) : "-";
+    };
     return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
 }
 
@@ -252,7 +255,7 @@ void drawDifferences(const Comparison& c)
             words(spreadInWords(m.groups[g], m.decimals), groupColour(g));
         }
         ImGui::TableNextColumn();
-        words(m.effect ? said("{:+.2Lf}", *m.effect) : "-");
+        words(m.effect ? said("{:+.2Lf}", base::printable(*m.effect, 2)) : "-");
         ImGui::TableNextColumn();
         drawSpreads(m, 12 * em, 1.8F * em);
     }
@@ -290,7 +293,8 @@ Errand drawGroups(State& state)
 
 Errand drawInstructor(State& state)
 {
-    roomForTwo() ? heading(tr("What are they doing?")) : void();
+    const char* const headings[]{tr("What are they doing?"), tr("What have they done?"), tr("How do groups differ?")};
+    roomForTwo() ? heading(headings[static_cast<std::size_t>(state.instructor.page)]) : void();
     int page = static_cast<int>(state.instructor.page);
     const std::pair<const char*, InstructorPage> pages[]{{tr("Sessions that run"), InstructorPage::live},
                                                          {tr("Sessions that were kept"), InstructorPage::sessions},
@@ -305,7 +309,7 @@ Errand drawInstructor(State& state)
     }
     const bool turned = page != static_cast<int>(state.instructor.page);
     state.instructor.page = static_cast<InstructorPage>(page);
-    turned ? state.notice.clear() : void();
+    turned ? (state.notice.clear(), state.told.clear()) : void();
     beginPart("page", 0, -3.4F * ImGui::GetFontSize());
     Errand errand = Errand::none;
     switch (state.instructor.page) {

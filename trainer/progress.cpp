@@ -164,6 +164,9 @@ std::string reasonFor(const ExerciseEntry& e)
     }
     const std::string asked = e.test ? said(tr("{} of {} tests at its level open the gate."), e.pass, e.of)
                                      : said(tr("{} of {} sessions at its level open the gate."), e.pass, e.of);
+    if (e.recentTried == 1) {
+        return asked + " " + (e.recentMet == 1 ? tr("The last one was at it.") : tr("The last one was not at it."));
+    }
     return e.recentTried == 0 ? asked
                               : asked + " " + said(tr("So far it is {} of the last {}."), e.recentMet, e.recentTried);
 }

@@ -62,6 +62,9 @@ Errand drawLosses(State& state)
         }
         ImGui::PopID();
     }
+    if (result.losses.size() > most) {
+        words(said(tr("These are the {} largest of {}."), most, result.losses.size()), quiet);
+    }
     return errand;
 }
 

@@ -1,6 +1,7 @@
 #include <trainer/results.h>
 
 #include <base/outputs.h>
+#include <base/printable.h>
 #include <base/said.h>
 #include <base/user_files.h>
 #include <trainer/lists.h>
@@ -57,7 +58,7 @@ std::string levelInWords(const nlohmann::json& asked)
 
 std::string withUnit(double value, int decimals, const std::string& unit)
 {
-    return said("{:.{}Lf}{}{}", value, decimals, unit.empty() ? "" : " ", unit);
+    return said("{:.{}Lf}{}{}", base::printable(value, decimals), decimals, unit.empty() ? "" : " ", unit);
 }
 
 // What the case is about, and the levels of the exercise. Labels of those that are shown already stay; the total, in large

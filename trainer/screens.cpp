@@ -329,6 +329,59 @@ Errand drawFoot(State& state, bool entered)
     return errand;
 }
 
+// What is said beside a screen, and where: its lower edge and sides, and how high it is.
+struct Notice {
+    std::string text;
+    float left = 0, wide = 0, bottom = 0, high = 0;
+};
+
+// Between the buttons of the foot where there is room, else above them.
+Notice placeOfNotice(const State& state)
+{
+    const std::string between = state.notice.empty() || state.told.empty() ? "" : "\n";
+    Notice place{drawable(state.notice + between + state.told)};
+    if (place.text.empty()) {
+        return place;
+    }
+    const ImGuiStyle& style = ImGui::GetStyle();
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float em = ImGui::GetFontSize(), side = style.WindowPadding.x;
+    const Foot foot = footOf(state);
+    const auto button = [&](const std::string& label) {
+        return label.empty() ? 0
+                             : ImGui::CalcTextSize(label.c_str()).x + 2 * style.FramePadding.x + 2 * style.ItemSpacing.x;
+    };
+    const float free = size.x - 2 * side - button(foot.back) - button(foot.main);
+    const bool inFoot = !rollsAsOne() && !foot.stacked && free > 24 * em;
+    place.left = inFoot ? side + button(foot.back) : side;
+    place.wide = inFoot ? free : size.x - 2 * side;
+    place.high = ImGui::CalcTextSize(place.text.c_str(), nullptr, false, place.wide - 2 * side).y + 0.6F * em;
+    const float beside = size.y - 3 * em + 0.5F * (ImGui::GetFrameHeight() + place.high);  // in the middle of the buttons
+    const float above = size.y - (rollsAsOne() ? heightOf(foot) + 2 * style.WindowPadding.y : 3 * em);
+    place.bottom = inFoot ? std::min(beside, size.y - 0.3F * em) : above;
+    return place;
+}
+
+// Over the screen and not in it: nothing moves below the mouse.
+void drawNotice(const State& state)
+{
+    const Notice place = placeOfNotice(state);
+    if (place.text.empty()) {
+        return;
+    }
+    ImGui::SetNextWindowPos({place.left, std::max(0.0F, place.bottom - place.high)});
+    ImGui::SetNextWindowSize({place.wide, std::min(place.high, place.bottom)});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {ImGui::GetStyle().WindowPadding.x, 0.3F * ImGui::GetFontSize()});
+    ImGui::PushStyleVar(ImGuiStyleVar_ItemSpacing, {0, 0});
+    ImGui::Begin("notice", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoSavedSettings |
+                     ImGuiWindowFlags_NoFocusOnAppearing);
+    state.notice.empty() ? void() : words(state.notice, orange);
+    state.told.empty() ? void() : words(state.told);
+    ImGui::End();
+    ImGui::PopStyleVar(2);
+}
+
 void drawWay(const State& state)
 {
     if (state.screen > Screen::result) {
@@ -386,9 +439,6 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
         ImGui::BeginChild("all", {0, -foot}, false, ImGuiWindowFlags_NavFlattened);
         entered ? ImGui::SetScrollY(0) : void();
     }
-    if (!state.notice.empty()) {
-        words(state.notice, orange);
-    }
     entered = entered && !state.popup;  // which keeps the focus
     Errand errand = Errand::none;
     const Screen before = state.screen;
@@ -415,13 +465,18 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
             errand = drawInstructor(state);
             break;
     }
-    one ? ImGui::EndChild() : void();
+    if (one) {
+        const float over = placeOfNotice(state).high;  // what it lies over can be rolled up
+        over > 0 ? ImGui::Dummy({0, over}) : void();
+        ImGui::EndChild();
+    }
     if (errand == Errand::none && state.screen == before) {
         errand = drawFoot(state, entered);
     }
     state.popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
     ImGui::PopItemFlag();
     ImGui::End();
+    drawNotice(state);
     one ? ImGui::PopStyleVar(3) : void();
     return errand;
 }

@@ -45,6 +45,7 @@ void turnTo(State& state, Screen screen)
 {
     state.screen = screen;
     state.notice.clear();
+    state.told.clear();
     state.leaving = false;
 }
 
@@ -350,6 +351,7 @@ void sessionStarted(State& state, SessionFiles files, std::string command)
     state.command = std::move(command);
     state.result = {};
     state.notice.clear();
+    state.told.clear();
     state.running = true;
     state.leaving = false;
     state.screen = Screen::session;
@@ -359,6 +361,7 @@ void sessionEnded(State& state, Result result)
 {
     state.running = state.leaving = false;
     state.notice.clear();
+    state.told.clear();
     state.result = std::move(result);
     state.screen = Screen::result;
     const bool counts = state.result.problem.empty() && (state.person.empty() || !state.result.notKept);

@@ -110,7 +110,8 @@ struct State {
     std::filesystem::path ghost;  // record of an expert that is shown beside it; empty: none
     bool filming = false;         // a film of the session is being made
     bool ghosting = false;        // an expert's session is being made
-    std::string notice;           // something that went wrong outside a session, or what has become of an errand
+    std::string notice;           // something that went wrong outside a session
+    std::string told;             // what an errand has come to, or that it is at work
     bool popup = false;           // something lies over the screen
     bool leaving = false;         // it was said what would be lost
     Settings settings;

@@ -93,8 +93,13 @@ std::string reasonFor(const ExerciseProgress& next)
                            next.sessions.empty() ? "is next" : "is not reached yet, with no test so far", gate.pass,
                            gate.of, what);
     }
-    return fmt::format("is not reached yet: {} of the last {} {} at its level, {} of {} are asked for", next.gate.recentMet,
-                       next.gate.recentTried, what, gate.pass, gate.of);
+    const std::string recent =
+        next.gate.recentTried == 1
+            ? fmt::format("the last {} was {}at its level", gate.testOnly ? "test" : "session",
+                          next.gate.recentMet == 1 ? "" : "not ")
+            : fmt::format("{} of the last {} {} at its level", next.gate.recentMet, next.gate.recentTried, what);
+    return fmt::format("is not reached yet: {}, {} of {} {} asked for", recent, gate.pass, gate.of,
+                       gate.of == 1 ? "is" : "are");
 }
 
 }  // namespace palpate::training

@@ -13,7 +13,9 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -159,7 +161,7 @@ std::string overview(const CurriculumProgress& c)
                                               e.exercise->gate.testOnly ? " tests" : "");
         out += fmt::format(
             "<tr><th>{}. {}</th><td><b class=\"state\" style=\"color:var(--{})\">{}</b></td><td class=\"n\">{}</td><td "
-            "class=\"n\">{} ({})</td><td>{}</td><td>{}</td></tr>",
+            "class=\"n\">{} ({})</td><td class=\"signals\">{}</td><td>{}</td></tr>",
             ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recent, asked,
             e.sessions.empty() ? "-" : signals(e), e.daysSince ? days(*e.daysSince) : "never");
     }
@@ -180,7 +182,7 @@ std::string whatNext(const CurriculumProgress& c, const Person& person)
         escape(base::shellWord(nameToFind(*c.curriculum) + "/" + next->exercise->id)), test ? " --test" : "");
 }
 
-std::string assumptions(const CusumPlan& plan)
+std::string assumptionsOf(const CusumPlan& plan)
 {
     const auto length = [&](CusumChart chart, double p) {
         const double n = averageRunLength(plan, chart, p);
@@ -252,7 +254,20 @@ std::string freeCard(const PersonProgress& p)
     return out + "</tbody></table></div></section>";
 }
 
-std::string personPart(const PersonProgress& p, json& charts)
+// What goes into the page beside its text, and what people have in common.
+struct Gathered {
+    json charts = json::object();
+    std::map<std::array<double, 4>, std::string> assumptions;  // by the parameters of the chart: run lengths take long
+
+    const std::string& assumed(const CusumPlan& plan)
+    {
+        std::string& words = assumptions[{plan.p0, plan.p1, plan.alpha, plan.beta}];
+        words = words.empty() ? training::assumptionsOf(plan) : words;
+        return words;
+    }
+};
+
+std::string personPart(const PersonProgress& p, Gathered& page)
 {
     std::string out =
         fmt::format("<header><div><p class=\"eyebrow\">{} hand &middot; {} since {}</p><h1>{}</h1></div></header>",
@@ -263,9 +278,9 @@ std::string personPart(const PersonProgress& p, json& charts)
     }
     for (const CurriculumProgress& c : p.curricula) {
         out += "<section class=\"card\"><h2>" + escape(c.curriculum->title) + "</h2>" + whatNext(c, p.person) +
-               overview(c) + "<p class=\"note\">" + assumptions(c.curriculum->cusum) + "</p></section>";
+               overview(c) + "<p class=\"note\">" + page.assumed(c.curriculum->cusum) + "</p></section>";
         for (const ExerciseProgress& e : c.exercises) {
-            out += e.sessions.empty() ? "" : exerciseCard(e, c.curriculum->cusum, charts);
+            out += e.sessions.empty() ? "" : exerciseCard(e, c.curriculum->cusum, page.charts);
         }
     }
     return out + freeCard(p);
@@ -282,11 +297,11 @@ std::vector<double> rowOf(const StoredSession& session)
 void writeProgressPage(const std::filesystem::path& html, const std::vector<PersonProgress>& people,
                        const std::vector<report::ScoredGroup>& groups)
 {
-    json charts = json::object();
+    Gathered page;
     std::string body = base::sumOf(
-        people, [&](const PersonProgress& p) { return personPart(p, charts); }, std::string());
+        people, [&](const PersonProgress& p) { return personPart(p, page); }, std::string());
     body += groups.empty() ? "" : report::groupsPart(groups);
-    base::writeWhole(html, report::page("Progress - Palpate", body, {{"events", json::array()}, {"charts", charts}}));
+    base::writeWhole(html, report::page("Progress - Palpate", body, {{"events", json::array()}, {"charts", page.charts}}));
 }
 
 }  // namespace palpate::training

@@ -98,15 +98,16 @@ function nameEvents(ctx, bbox, events) {
 }
 
 const axis = (label, size) => ({
-  label, labelSize: 18, size, gap: 4, stroke: colour("soft"), labelFont: "12px system-ui, sans-serif",
-  font: "12px system-ui, sans-serif", grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 5 },
+  label, labelSize: 18, size, gap: 4, stroke: () => colour("soft"), labelFont: "12px system-ui, sans-serif",
+  font: "12px system-ui, sans-serif", grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("line"), width: 1, size: 5 },
 });
 
 function draw(id, chart) {
   const place = document.getElementById(id);
   if (!place) return;
   if (chart.scatter) {
-    charts.push({ plot: scatter(place, chart, axis), place });
+    const plot = scatter(place, chart, axis);
+    charts.push({ plot, place, height: plot.height });
     nameLines(place, chart);
     return;
   }
@@ -133,12 +134,12 @@ function draw(id, chart) {
     legend: { markers: { fill: (u, i) => u.series[i].stroke(u, i), width: 0 } },
     series: [{ label: chart.x.name, value: value(chart.x.unit) }].concat(chart.series.map((s) => ({
       label: s.label, stroke: () => colour(s.colour), width: s.width || 1.6, dash: s.dash, show: s.show !== false,
-      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: chart.points ? { show: true, size: 6, fill: colour("card") } : { show: false }, spanGaps: s.gaps === false,
+      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: chart.points ? { show: true, size: 6, fill: () => colour("card") } : { show: false }, spanGaps: s.gaps === false,
     }))),
     hooks: { draw: [(u) => { horizontal(u, chart.lines || []); vertical(u, chart.events ? data.events : []); }] },
   };
   const plot = new uPlot(options, chart.columns, place);
-  charts.push({ plot, place });
+  charts.push({ plot, place, height: plot.height });
   nameLines(place, chart);
 }
 
@@ -152,10 +153,29 @@ function drawAll() {
 
 drawAll();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+const fitWindow = () => {
+  for (const { plot, place, height } of charts) plot.setSize({ width: Math.max(place.clientWidth, 240), height });
+};
 let resized = 0;
 addEventListener("resize", () => {
   cancelAnimationFrame(resized);
-  resized = requestAnimationFrame(() => {
-    for (const { plot, place } of charts) plot.setSize({ width: Math.max(place.clientWidth, 240), height: plot.height });
-  });
+  resized = requestAnimationFrame(fitWindow);
+});
+
+// A page of paper is narrower than most windows, always light, and nobody can open anything on it.
+const paper = 680, halfPaper = 330, lowOnPaper = 165;
+let opened = [];
+addEventListener("beforeprint", () => {
+  document.documentElement.classList.add("printing");
+  opened = [...document.querySelectorAll("details:not([open])")];
+  for (const one of opened) one.open = true;
+  for (const { plot, place, height } of charts) {
+    const half = place.closest(".charts");
+    plot.setSize({ width: half ? halfPaper : paper, height: half ? lowOnPaper : height });
+  }
+});
+addEventListener("afterprint", () => {
+  document.documentElement.classList.remove("printing");
+  for (const one of opened.splice(0)) one.open = false;
+  fitWindow();
 });

@@ -233,3 +233,14 @@ addEventListener("resize", () => {
   if (rowsOfLegend(legend.names, byId("curve").clientWidth) !== legend.rows) draw();
   else drawFitted();
 });
+// On paper, 680 pixels wide, nobody can open anything.
+let opened = [];
+addEventListener("beforeprint", () => {
+  opened = [...document.querySelectorAll("details:not([open])")];
+  for (const one of opened) one.open = true;
+  for (const chart of Object.values(charts)) chart?.resize({ width: 680 });
+});
+addEventListener("afterprint", () => {
+  for (const one of opened.splice(0)) one.open = false;
+  for (const chart of Object.values(charts)) chart?.resize({ width: "auto" });
+});

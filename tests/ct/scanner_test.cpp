@@ -11,6 +11,7 @@
 #include <cstring>
 #include <memory>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 namespace palpate::ct {
@@ -196,6 +197,26 @@ TEST(CtScan, TheNeedleIsMetalToItsTip)
     EXPECT_NEAR(wide * scan.pixel, 2.1e-3, 1.3e-3);
     EXPECT_EQ(scan.at(1, column, row), 3071);
     EXPECT_LT(scan.at(2, column, row), 200) << "5 mm beside it there is no metal";
+}
+
+// The trainee sees where a core came from: over the notch's length and width, and nowhere else.
+TEST(CtScan, ACoreLeavesItsHole)
+{
+    Cube cube;
+    cube.state.tip = {0.0, 0.03, 0.0};
+    const Scan before = cube.scan();
+    cube.s.holeRadius = 1.5e-3;
+    cube.state.holes = 1;
+    cube.state.hole[0] = {{0.002F, -0.03F, 0.0F}, {0.002F, -0.015F, 0.0F}};
+    const Scan after = cube.scan();
+    const auto numberAt = [](const Scan& scan, std::size_t slice, double x, double y) {
+        return scan.at(slice, static_cast<int>(std::lround((x - scan.corner.x) / scan.pixel)),
+                       static_cast<int>(std::lround((y - scan.corner.y) / scan.pixel)));
+    };
+    EXPECT_LT(numberAt(after, 1, 0.002, -0.022), numberAt(before, 1, 0.002, -0.022) - 100);
+    for (const auto& [slice, x, y] :
+         {std::tuple{1U, 0.002, -0.011}, {1U, 0.002, -0.034}, {1U, 0.009, -0.022}, {2U, 0.002, -0.022}})
+        EXPECT_EQ(numberAt(after, slice, x, y), numberAt(before, slice, x, y)) << slice << ' ' << x << ' ' << y;
 }
 
 TEST(CtScan, ABodyThatCameWithCtHasItsNumbers)

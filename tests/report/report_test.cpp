@@ -1,8 +1,10 @@
 #include <base/inputs.h>
 #include <base/png.h>
+#include <haptics/measures.h>
 #include <report/data.h>
 #include <report/groups.h>
 #include <report/html.h>
+#include <report/measure_table.h>
 #include <report/path.h>
 #include <report/report.h>
 
@@ -428,6 +430,41 @@ TEST(Report, WithoutScriptsTheReaderLearnsFirstThatChartsAreMissing)
     const std::string text = page("t", "<h1>body</h1>", nlohmann::json::object());
     EXPECT_LT(text.find("<noscript><p class=\"warning\">The charts need JavaScript"), text.find("<h1>body</h1>"));
     EXPECT_NE(text.find("<noscript><style>.chart { display: none; }"), std::string::npos);
+}
+
+// A card that may not break goes to the next page when it is long, and its heading stays alone; what scrolls is cut off.
+TEST(Report, OnPaperNothingScrollsAndNothingIsClosed)
+{
+    const std::string text = page("t", "", nlohmann::json::object());
+    const std::string print = between(text, "@media print {", "</style>");
+    EXPECT_NE(print.find(".scroll, pre { overflow: visible; }"), std::string::npos);
+    EXPECT_EQ(print.find(".card { break-inside"), std::string::npos);
+    EXPECT_NE(print.find(".hint, .u-legend.u-live .u-series:first-child"), std::string::npos);
+    EXPECT_NE(between(text, "addEventListener(\"beforeprint\"", "});").find("one.open = true"), std::string::npos);
+    EXPECT_NE(between(text, "addEventListener(\"afterprint\"", "});").find("one.open = false"), std::string::npos);
+}
+
+TEST(Report, WhatRoundsToZeroHasNoMinus)
+{
+    haptics::Score score;
+    score.tissueWork = -2e-4;  // [J]: prints as 0 mJ, and of groups as -0.2
+    const auto lines = haptics::describeMeasures(score);
+    const auto work = std::ranges::find(lines, "Work on the tissue", &haptics::LabelledValues::value_type::first);
+    ASSERT_NE(work, lines.end());
+    EXPECT_EQ(work->second, "0 mJ");
+    EXPECT_EQ(cell(-0.04, 1), "0.0");
+    EXPECT_EQ(cell(-0.06, 1), "-0.1");
+    EXPECT_EQ(deltaText(-0.004), "+0.00");
+    EXPECT_EQ(deltaText(-0.25), "-0.25");
+}
+
+// The dot plot of a group has little room for its name; the whole name is there to point at.
+TEST(Report, NamesThatAreCutOffSaySo)
+{
+    haptics::Score low, high;
+    high.total = 90;
+    const std::string part = groupsPart({{"A group with a long name", {rowOf(low)}}, {"b", {rowOf(high)}}});
+    EXPECT_NE(part.find(">A group with \u2026<title>A group with a long name</title></text>"), std::string::npos) << part;
 }
 
 TEST(Report, RefusesAFolderThatIsNotThereOnOneLine)

@@ -1,5 +1,6 @@
 #include <tests/folder.h>
 #include <trainer/errands.h>
+#include <trainer/pages.h>
 
 #include <gtest/gtest.h>
 
@@ -8,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <regex>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -221,6 +224,55 @@ TEST(Errands, AKeptNoteIsNoDraftThoughANewerSessionHasEnded)
     EXPECT_TRUE(state.instructor.drafts.empty());
     EXPECT_EQ(state.instructor.everybody.sessions.at(state.instructor.chosen).number, 1);
     EXPECT_EQ(state.instructor.note, "look at the probe");
+}
+
+// The window goes on while they are written, and says where they are.
+TEST(Errands, PagesAreWrittenBesideTheWindow)
+{
+    const Folder folder;
+    makeScript(folder / "palpate", "while [ ! -e '" + (folder / "go").string() +
+                                       "' ]; do sleep 0.01; done\necho \"$@\" >'" + (folder / "asked").string() + "'");
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.person = "ada";
+    errands.run(Errand::writeProgress, state);
+    EXPECT_EQ(state.told, "Page, table and xAPI statements are being written ...");
+    EXPECT_FALSE(std::filesystem::exists(folder / "asked"));
+    std::ofstream(folder / "go") << "";
+    lookUntil(errands, state, [&] { return state.told.starts_with("Written to "); });
+    EXPECT_NE(state.told.find("progress-ada"), std::string::npos) << state.told;
+    EXPECT_EQ(state.notice, "");
+    makeProgram(folder / "palpate", "palpate: the disk is full", 1);
+    errands.run(Errand::writeProgress, state);
+    lookUntil(errands, state, [&] { return !state.notice.empty(); });
+    EXPECT_EQ(state.notice, "That did not work:\npalpate: the disk is full");
+    EXPECT_EQ(state.told, "");
+}
+
+TEST(Errands, APageOfGroupsReplacesNoOther)
+{
+    const Folder folder;
+    makeScript(folder / "palpate", "for last; do :; done\necho '{}' >\"$last\"");
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    for (const char* const name : {"ada", "bert"}) {
+        state.people.emplace_back().name = name;
+    }
+    putIntoGroup(state, "ada", 1);
+    putIntoGroup(state, "bert", 2);
+    state.instructor.asPage = true;
+    errands.run(Errand::compareGroups, state);
+    EXPECT_EQ(state.notice, "");
+    const std::regex written("Written to .*/groups-[0-9]{8}-[0-9]{6}\\.html");
+    EXPECT_TRUE(std::regex_match(state.told, written)) << state.told;
+    std::set<std::filesystem::path> files;
+    for (int i = 0; i < 3; ++i) {
+        const auto [at, isNew] = files.insert(freshFile(folder / "groups", ".html"));
+        EXPECT_TRUE(isNew) << *at;
+        std::ofstream(*at) << "";
+    }
 }
 
 // The window says what went wrong, and what else runs goes on.

@@ -3,6 +3,7 @@
 #include <trainer/example.h>
 #include <trainer/look.h>
 #include <trainer/screens.h>
+#include <trainer/widgets.h>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -174,6 +176,34 @@ TEST_P(Screens, WhatRollsIsNoSlit)
             EXPECT_TRUE(!part || w->InnerRect.GetHeight() >= 6 * ImGui::GetIO().Fonts->Fonts[0]->FontSize)
                 << w->Name << ": " << w->InnerRect.GetHeight();
         }
+    }
+}
+
+// Whoever is about to click must not hit another button because something was said.
+TEST_P(Screens, WhatIsSaidMovesNothing)
+{
+    const auto places = [] {
+        std::map<std::string, std::vector<float>> all;
+        for (const ImGuiWindow* w : windows()) {
+            all[w->Name] = {w->Pos.x, w->Pos.y, w->Size.x, w->Size.y};
+            if (!rollsAsOne())  // there what was said adds room at the end
+                all[w->Name].insert(all[w->Name].end(), {w->DC.CursorStartPos.y, w->ContentSize.y});
+        }
+        return all;
+    };
+    for (auto& [name, state] : exampleScreens(listed())) {
+        SCOPED_TRACE(name);
+        draw(state);
+        const auto before = places();
+        state.notice = "That did not work:\npalpate: ada: is not there";
+        state.told = "Written to /home/ada/.local/share/palpate/sessions/groups-20261128-225228.html";
+        draw(state);
+        EXPECT_EQ(places(), before);
+        const ImGuiWindow* const said = ImGui::FindWindowByName("notice");
+        ASSERT_NE(said, nullptr);
+        EXPECT_TRUE(said->WasActive);
+        EXPECT_LE(said->Pos.x + said->Size.x, width);
+        EXPECT_LE(said->Pos.y + said->Size.y, height);
     }
 }
 
