@@ -38,6 +38,7 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -329,6 +330,18 @@ void prepare(TrainArguments& o, Training& training)
     checkOutputs(o);
 }
 
+// In a test the hand does not begin on the plan. Which place it is follows from --seed, and else is another each time; the
+// record has it.
+std::optional<std::uint64_t> startOf(const TrainArguments& o, haptics::SessionInfo& info)
+{
+    if (!o.training.test || !session::deviceKind(o.device).needsViewer) {
+        return std::nullopt;
+    }
+    const std::uint64_t start = o.changes.seed ? *o.changes.seed : std::random_device()();
+    info.extra.emplace_back("start_seed", fmt::format("{}", start));
+    return start;
+}
+
 void train(TrainArguments o)
 {
     if (wantsWindow(o)) {
@@ -361,7 +374,7 @@ void train(TrainArguments o)
         info.extra.emplace_back("setting", fitted);
     }
     session::TrainOptions options;
-    options.device = {o.device, o.trainee, seed, std::move(falcon)};
+    options.device = {o.device, o.trainee, seed, std::move(falcon), startOf(o, info)};
     options.session = sessionName(o);
     options.record = record;
     options.servo = {!o.unpaced, o.seconds};

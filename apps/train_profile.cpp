@@ -200,7 +200,7 @@ Conclusion Training::outcome(const haptics::SessionInfo& info, session::TrainRes
         return notKept("the record of the session is not whole", {});
     }
     if (result.signal != 0 || result.faulted) {
-        return notKept(result.signal != 0 ? "the session was interrupted" : "the session ended with a fault", record);
+        return notKept(result.signal != 0 ? "the session was interrupted" : "the session ended with a fault", {});
     }
     try {
         return keep(info, result, record);

@@ -131,15 +131,15 @@ bool sound(const State& s, const Scenery& scenery) noexcept
                         upTo(s.proxy, furthest) && upTo(s.inserted, furthest) && upTo(s.aheadSpeed, strongest);
     const bool forces = upTo(s.basic, strongest) && upTo(s.additional, strongest) && upTo(s.total, strongest);
     const bool rows = s.phase <= Phase::inserted && s.status <= Status::faulted && s.warning <= Warning::touching &&
-                      s.tissue < maxTissues && s.aheadTissue < maxTissues &&
-                      s.warned < std::max<std::uint32_t>(scenery.structures, 1);
+                      s.tissue < maxTissues && s.aheadTissue < maxTissues && s.refusedBy < maxTissues &&
+                      s.stoppedBy < maxTissues && s.warned < std::max<std::uint32_t>(scenery.structures, 1);
     const bool probe =
         sound(s.probe) && s.holes <= maxHoles && std::ranges::all_of(s.hole, [](const Hole& h) { return sound(h); });
     const bool marks = std::ranges::all_of(s.mark, [](const Mark& m) { return sound(m); });
     return places && forces && rows && probe && marks && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
            upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && upTo(s.bestTarget, furthest) &&
-           upTo(s.refused, largestValue) && number(s.aheadTissueDistance) && std::ranges::all_of(s.distance, number) &&
-           std::ranges::all_of(s.ahead, number);
+           upTo(s.refused, largestValue) && upTo(s.stopped, largestValue) && upTo(s.thrown, furthest) &&
+           number(s.aheadTissueDistance) && std::ranges::all_of(s.distance, number) && std::ranges::all_of(s.ahead, number);
 }
 
 bool sound(const Input& input) noexcept

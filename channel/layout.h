@@ -153,12 +153,13 @@ struct State {
     Phase phase = Phase::free;
     Status status = Status::running;
     Warning warning = Warning::none;
-    std::uint32_t warned = 0;    // index of the structure that the warning is about
-    std::uint32_t tissue = 0;    // row of the tissue table at the tip
-    std::uint32_t cores = 0;     // samples taken
-    std::uint32_t bestCore = 0;  // the one with the largest share of target, from 1; 0: none
-    std::uint32_t padding = 0;
-    double inserted = 0;                           // length of the shaft inside [m]
+    std::uint32_t warned = 0;     // index of the structure that the warning is about
+    std::uint32_t tissue = 0;     // row of the tissue table at the tip
+    std::uint32_t cores = 0;      // samples taken
+    std::uint32_t bestCore = 0;   // the one with the largest share of target, from 1; 0: none
+    std::uint16_t refusedBy = 0;  // row of the bone in whose way the gun did not fire; 0: the needle was not inside
+    std::uint16_t stoppedBy = 0;  // row of the bone that stopped a throw
+    double inserted = 0;          // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
     // From the tip to where the needle's line touches it; infinite: not within lookAheadReach, nor within the throw [m].
     std::array<double, maxStructures> ahead{};
@@ -170,7 +171,9 @@ struct State {
     double coreTarget = 0;           // fraction of target tissue in the last core
     double coreLength = 0;           // length in the target of the last core [m]
     double bestTarget = 0;           // fraction of target tissue in bestCore
-    double refused = -1;             // when the gun did not fire because the needle was not inside [s]; below 0: never
+    double refused = -1;             // when the gun did not fire [s]; below 0: never
+    double stopped = -1;             // when bone stopped the needle that the gun threw [s]; below 0: never
+    double thrown = 0;               // how far that got [m]
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
     Standing standing = Standing::no;

@@ -22,6 +22,27 @@ Frame frameAcross(Vec3 axis) noexcept
     return {right, glm::cross(axis, right)};
 }
 
+constexpr int throwHalvings = 5;  // of a step that ends in bone
+constexpr int mostSteps = 400;    // from the proxy to the tip
+
+// The row of bone at a place at rest; 0: there is none.
+std::uint8_t boneAt(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 rest) noexcept
+{
+    const std::uint8_t row = reader.tissue(rest);
+    return model.tissue->table().rows[row].role == volume::Role::bone ? row : std::uint8_t{0};
+}
+
+// The first bone on a straight way at rest; 0: there is none.
+std::uint8_t boneBetween(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 from, Vec3 to) noexcept
+{
+    const int steps = std::clamp(static_cast<int>(std::ceil(glm::distance(from, to) / throwStep)), 1, mostSteps);
+    std::uint8_t bone = 0;
+    for (int i = 0; i <= steps && bone == 0; ++i) {
+        bone = boneAt(model, reader, glm::mix(from, to, static_cast<double>(i) / steps));
+    }
+    return bone;
+}
+
 // Counts the pieces of a core, slice by slice along its axis.
 struct Pieces {
     double slice = 0;  // length [m]
@@ -49,14 +70,41 @@ struct Pieces {
 
 }  // namespace
 
+Throw throwOf(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body, Vec3 proxy,
+              Vec3 tip, Vec3 axis) noexcept
+{
+    std::uint8_t bone = boneBetween(model, reader, proxy, proxy + minPiece * axis);
+    bone = bone != 0 ? bone : boneBetween(model, reader, proxy, occupancy::restPoint(body, tip));
+    if (bone != 0) {
+        return {0.0, bone};
+    }
+    const double whole = model.scene.tool.throwLength;
+    const auto boneAfter = [&](double way) { return boneAt(model, reader, occupancy::restPoint(body, tip + way * axis)); };
+    const int steps = static_cast<int>(std::ceil(whole / throwStep));
+    for (int i = 1; i <= steps; ++i) {
+        double low = (i - 1) * throwStep, high = std::min(i * throwStep, whole);
+        bone = boneAfter(high);
+        for (int n = 0; n < throwHalvings && bone != 0; ++n) {
+            const double middle = 0.5 * (low + high);
+            (boneAfter(middle) != 0 ? high : low) = middle;
+        }
+        if (bone != 0) {
+            return {low, bone};
+        }
+    }
+    return {whole, 0};
+}
+
 CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
-                    const Cuts& cuts, Vec3 tip, Vec3 axis) noexcept
+                    const Cuts& cuts, Vec3 tip, Vec3 axis, double thrown) noexcept
 {
     const auto& tool = model.scene.tool;
     const auto& target = model.structures[0].labels;
+    const double way = std::min(thrown, tool.throwLength);
+    const double length = way < tool.throwLength ? std::min(tool.notchLength, way) : tool.notchLength;
     CoreSample core;
-    core.notchEnd = tip + tool.throwLength * axis;
-    core.notchStart = core.notchEnd - tool.notchLength * axis;
+    core.notchEnd = tip + way * axis;
+    core.notchStart = core.notchEnd - length * axis;
     const auto [right, up] = frameAcross(axis);
     const auto inTarget = [&](Vec3 rest) {
         return std::find(target.begin(), target.end(), reader.label(rest)) != target.end();
@@ -65,9 +113,9 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
     int filled = 0;
     int hits = 0;
     int slicesInTarget = 0;
-    Pieces pieces{tool.notchLength / coreSlices};
+    Pieces pieces{length / coreSlices};
     for (int i = 0; i < coreSlices; ++i) {
-        const Vec3 middle = core.notchStart + (i + 0.5) / coreSlices * tool.notchLength * axis;
+        const Vec3 middle = core.notchStart + (i + 0.5) / coreSlices * length * axis;
         // The displacement varies over the lattice's spacing, far more slowly than over the notch's width.
         const Vec3 rest = occupancy::restPoint(body, middle);
         const HolesNear holes(cuts, rest, tool.notchRadius);
@@ -95,10 +143,10 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
     for (double& f : core.fraction) {
         f /= std::max(filled, 1);
     }
-    const double notch = std::numbers::pi * tool.notchRadius * tool.notchRadius * tool.notchLength;
+    const double notch = std::numbers::pi * tool.notchRadius * tool.notchRadius * length;
     core.volume = notch * filled / coreSamples;
     core.targetFraction = static_cast<double>(hits) / std::max(filled, 1);
-    core.targetLength = tool.notchLength * slicesInTarget / coreSlices;
+    core.targetLength = length * slicesInTarget / coreSlices;
     core.fragments = pieces.count;
     return core;
 }

@@ -100,8 +100,15 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
         }
     }
     const auto events = std::span(r.events).first(std::min<std::size_t>(r.eventCount, maxEventsPerTick));
-    if (std::ranges::find(events, EventKind::fireRefused, &Event::kind) != events.end()) {
-        state.refused = state.time;
+    for (const Event& event : events) {
+        if (event.kind == EventKind::fireRefused) {
+            state.refused = state.time;
+            state.refusedBy = event.tissue;
+        } else if (event.kind == EventKind::throwStopped) {
+            state.stopped = state.time;
+            state.stoppedBy = event.tissue;
+            state.thrown = event.value;
+        }
     }
     state.missed = timing.missed;
     if (r.tick % p99Period == p99Period - 1) {

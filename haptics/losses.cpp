@@ -27,6 +27,11 @@ double points(double most, double fraction)
     return most * (1 - fraction);
 }
 
+std::string tissueCalled(const SessionInfo& info, std::uint8_t row)
+{
+    return row < info.tissues.size() ? base::spokenHere(info.tissues[row]) : tr("bone");
+}
+
 std::string timesInWords(std::uint32_t n)
 {
     return n == 1 ? tr("once") : said(tr("{} times"), n);
@@ -77,6 +82,7 @@ void LossWatch::add(const TickRecord& record) noexcept
     };
     if (record.fired && (bestOf(now) != bestOf(before_) || now.passes == 1)) {
         core_ = record.core;
+        stop_ = {};
         at_[shot] = seconds;
     }
     note(secondShot, now.passes == 2 && before_.passes == 1, seconds);
@@ -92,20 +98,30 @@ void LossWatch::add(const TickRecord& record) noexcept
             at_[touch] = seconds;
             touched_ = event.structure;
         }
-        note(refusal, event.kind == EventKind::fireRefused, seconds);
+        if (event.kind == EventKind::throwStopped && at_[shot] == seconds) {
+            stop_ = event;
+        }
+        const bool refused = event.kind == EventKind::fireRefused;
+        bone_ = refused && bone_ == 0 ? event.tissue : bone_;
+        note(refusal, refused && event.tissue == 0, seconds);
+        note(boneRefusal, refused && event.tissue != 0, seconds);
     }
     note(mark, now.marks > before_.marks, seconds);
     before_ = now;
 }
 
 // Where the best core lay, from the target at rest: records hold no more, and say the same as the session did.
-std::string LossWatch::miss(const Score& s, const std::string& target) const
+std::string LossWatch::miss(const Score& s, const SessionInfo& info, const std::string& target) const
 {
     std::string words = s.bestTargetFraction > 0 ? said(tr("The best core is {:.0f} % {} over {:.1Lf} mm"),
                                                         100 * s.bestTargetFraction, target, 1e3 * s.bestTargetLength)
                                                  : said(tr("No core hit the {}"), target);
     if (s.bestTargetFraction <= 0 && std::isfinite(s.targetingError)) {
         words += said(tr(": the nearest lay {:.1Lf} mm beside it"), 1e3 * s.targetingError);
+    }
+    if (stop_.kind == EventKind::throwStopped) {
+        words +=
+            said(tr("; its throw was stopped by {} after {:.1Lf} mm"), tissueCalled(info, stop_.tissue), 1e3 * stop_.value);
     }
     const Vec3 notch = core_.notchEnd - core_.notchStart;
     if (!target_ || glm::length(notch) < worthSaying) {
@@ -157,19 +173,29 @@ Loss LossWatch::ofBeyond(const Score& s, double most, const std::string& target)
             said(tr("The needle was pushed {:.1Lf} mm deeper than the {}"), 1e3 * s.beyondTarget, target), at(beyond)};
 }
 
+Loss LossWatch::ofNoCore(const SessionInfo& info) const
+{
+    if (at(boneRefusal)) {
+        return {"passes", 75,
+                said(tr("The gun was fired only with the tip at {}: there is no core"), tissueCalled(info, bone_)),
+                at(boneRefusal)};
+    }
+    return {"passes", 75,
+            at(refusal) ? tr("The gun was fired only outside the body: there is no core")
+                        : tr("The gun was not fired: there is no core"),
+            at(refusal)};
+}
+
 std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) const
 {
     const std::string target = info.structures.empty() ? tr("target") : base::spokenHere(info.structures[0]);
     if (s.passes == 0) {
-        return {{"passes", 75,
-                 at(refusal) ? tr("The gun was fired only outside the body: there is no core")
-                             : tr("The gun was not fired: there is no core"),
-                 at(refusal)}};
+        return {ofNoCore(info)};
     }
     const ScoreShares fraction = sharesOf(s);
     const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * fraction.hit * fraction.stays;
     std::vector<Loss> all{
-        {"best_target_pct", points(50, parts(s).core / 50) + points(25, fraction.hit), miss(s, target), at(shot)},
+        {"best_target_pct", points(50, parts(s).core / 50) + points(25, fraction.hit), miss(s, info, target), at(shot)},
         ofBeyond(s, 25 * fraction.hit, target),
         {"passes", points(each, fraction.passes), said(tr("{} cores were taken; one can do"), s.passes), at(secondShot)},
         ofContacts(s, each),

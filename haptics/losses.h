@@ -48,12 +48,14 @@ private:
         blind,
         pierced,
         refusal,
+        boneRefusal,
         moments
     };
 
     void note(Moment moment, bool now, double seconds) noexcept;
     std::optional<double> at(Moment moment) const noexcept;
-    std::string miss(const Score& score, const std::string& target) const;
+    std::string miss(const Score& score, const SessionInfo& info, const std::string& target) const;
+    Loss ofNoCore(const SessionInfo& info) const;
     std::vector<Loss> ofBiopsy(const Score& score, const SessionInfo& info) const;
     std::vector<Loss> ofPalpation(const Score& score, const SessionInfo& info) const;
     std::vector<Loss> ofRest(const Score& score) const;
@@ -70,6 +72,8 @@ private:
     Score before_;                      // after the tick before
     std::array<double, moments> at_{};  // [s]; below 0: never
     CoreSample core_;                   // the best
+    Event stop_;                        // of its throw by bone; another kind: it was not stopped
+    std::uint8_t bone_ = 0;             // at which the gun was refused first
     std::uint8_t touched_ = 0xFF;       // the vital structure that was touched first
     std::optional<TargetShape> target_;
 };

@@ -1,12 +1,14 @@
 #include <haptics/mouse.h>
 
 #include <channel/deformation.h>
+#include <datasets/phantom_random.h>
 #include <haptics/bounded.h>
 
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace palpate::haptics {
@@ -91,6 +93,43 @@ DeviceSample MouseDevice::read() noexcept
     sample.buttons |= unmark_.down(input_.unmarks) ? buttonUnmark : 0U;
     sample.buttons |= picture_.down(input_.pictures) ? buttonPicture : 0U;
     return sample;
+}
+
+Start startOffPlan(const SessionModel& model, double distance, std::uint64_t seed) noexcept
+{
+    constexpr double degree = std::numbers::pi / 180.0;
+    constexpr double clear = 15e-3;  // from the target to the needle's line, if a place has it [m]
+    constexpr int tries = 32, rises = 16;
+    const auto& [entry, aim, planned] = model.approach;
+    const Vec3 out = model.surface.normal(entry);
+    const Vec3 right = glm::normalize(glm::cross(out, std::abs(out.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
+    const Vec3 up = glm::cross(out, right);
+    const auto towards = [&](double angle) { return std::cos(angle) * right + std::sin(angle) * up; };
+    datasets::Random random(seed ^ 0x5374617274U);
+    Start best;
+    double farthest = -1.0;
+    for (int i = 0; i < tries && farthest < clear; ++i) {
+        const double side = random.between(0.0, 2.0 * std::numbers::pi), aside = random.between(15e-3, 25e-3);
+        const double tilt = random.between(10.0, 20.0) * degree, lean = side + random.between(-90.0, 90.0) * degree;
+        Start s{entry + aside * towards(side) + distance * out, -out};
+        for (int k = 0; k < rises; ++k) {
+            s.tip += std::max(0.0, distance - model.surface.distance(s.tip)) * out;
+        }
+        if (model.scene.tool.kind == datasets::ToolKind::needle) {
+            s.axis = glm::normalize(-std::cos(tilt) * out + std::sin(tilt) * towards(lean));
+        }
+        const Vec3 way = aim - s.tip;
+        const double off = glm::length(way - glm::dot(way, s.axis) * s.axis);
+        best = off > farthest ? s : best;
+        farthest = std::max(farthest, off);
+    }
+    return best;
+}
+
+MouseDevice mouseOffPlan(const SessionModel& model, MouseDevice::Source source, double distance, std::uint64_t seed)
+{
+    const Start start = startOffPlan(model, distance, seed);
+    return {deviceParameters(model.scene.device), std::move(source), start.tip, start.axis};
 }
 
 MouseDevice mouseBefore(const SessionModel& model, MouseDevice::Source source, double distance)

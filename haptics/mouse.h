@@ -7,6 +7,7 @@
 #include <haptics/session_model.h>
 #include <haptics/trigger.h>
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 
@@ -57,6 +58,19 @@ private:
     Trigger fire_, mark_, unmark_, picture_;
     bool ended_ = false;
 };
+
+/// Where a tool waits.
+struct Start {
+    Vec3 tip{0.0};       // [m]
+    Vec3 axis{0, 1, 0};  // unit vector along the tool, towards the tip
+};
+
+/// A place and a direction that say nothing of the plan: 15 to 25 mm beside the planned entry, at least `distance` [m]
+/// above the body, a needle 10 to 20 degrees oblique and not towards the target. They follow from the seed.
+Start startOffPlan(const SessionModel& model, double distance, std::uint64_t seed) noexcept;
+
+/// The mouse with the scene's device in the hand, where startOffPlan() says.
+MouseDevice mouseOffPlan(const SessionModel& model, MouseDevice::Source source, double distance, std::uint64_t seed);
 
 /// The mouse with the scene's device in the hand, its tip `distance` [m] outside the body on the planned line.
 MouseDevice mouseBefore(const SessionModel& model, MouseDevice::Source source, double distance);

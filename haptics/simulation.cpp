@@ -327,7 +327,7 @@ void Simulation::seeNeedle() noexcept
     }
 }
 
-// The gun fires once per press of its button, and only a needle that is inside takes a core.
+// The gun fires once per press of its button, and only a needle that is inside takes a core. Bone ends its throw.
 void Simulation::fire() noexcept
 {
     if (!trigger_.with(record_.device)) {
@@ -339,12 +339,20 @@ void Simulation::fire() noexcept
         }
         return;
     }
+    const Throw thrown = throwOf(model_, reader_, body_, tip_.proxy, tool_.position, tool_.axis);
+    if (thrown.isBlocked()) {
+        addEvent(record_, {EventKind::fireRefused, 0xFF, thrown.bone, 0.0});
+        return;
+    }
     record_.fired = true;
-    record_.core = takeCore(model_, reader_, body_, tip_.needle.cuts, tool_.position, tool_.axis);
+    record_.core = takeCore(model_, reader_, body_, tip_.needle.cuts, tool_.position, tool_.axis, thrown.length);
     removeCore(model_, body_, record_.core, tool_.position, tip_.needle.cuts);
     const Vec3 middle = 0.5 * (record_.core.notchStart + record_.core.notchEnd);
     const double miss = model_.structures[0].distance.distance(occupancy::restPoint(body_, middle));
     addEvent(record_, {EventKind::fire, 0, tip_.tissue, miss});
+    if (thrown.bone != 0) {
+        addEvent(record_, {EventKind::throwStopped, 0xFF, thrown.bone, thrown.length});
+    }
     monitorThrow(model_, body_, tool_.position, record_.core.notchEnd, record_);
 }
 

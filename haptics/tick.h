@@ -65,19 +65,21 @@ enum class Phase : std::uint8_t { free, contact, inserted };
 inline constexpr std::array<std::string_view, 3> phaseNames{"free", "contact", "inserted"};
 
 enum class EventKind : std::uint8_t {
-    contact,      // the tool touched the body; tissue: touched; value: how far it went on in this tick [m]
-    release,      // the tool left the body
-    puncture,     // tissue: entered; value: force at which it gave way [N]
-    warning,      // structure: came nearer than its warning distance; value: distance [m]
-    vitalTouch,   // structure: was touched by the tool's surface; value: how deep that is in it [m]
-    fire,         // the gun; value: distance from the notch's middle to the target's surface [m]
-    fault,        // a force was not finite; the output is zero from now on
-    stepDown,     // ticks came late: a cheaper model from now on; value: how many steps down from the scene's
-    veryNear,     // structure: came nearer than 0.4 of its warning distance; value: distance [m]
-    fireRefused,  // the gun's button went down and the needle was not inside
+    contact,       // the tool touched the body; tissue: touched; value: how far it went on in this tick [m]
+    release,       // the tool left the body
+    puncture,      // tissue: entered; value: force at which it gave way [N]
+    warning,       // structure: came nearer than its warning distance; value: distance [m]
+    vitalTouch,    // structure: was touched by the tool's surface; value: how deep that is in it [m]
+    fire,          // the gun; value: distance from the notch's middle to the target's surface [m]
+    fault,         // a force was not finite; the output is zero from now on
+    stepDown,      // ticks came late: a cheaper model from now on; value: how many steps down from the scene's
+    veryNear,      // structure: came nearer than 0.4 of its warning distance; value: distance [m]
+    fireRefused,   // the gun's button went down and the needle was not inside, or its tip was at bone; tissue: that bone
+    throwStopped,  // bone stopped the needle that the gun threw; tissue: that bone; value: how far it got [m]
 };
-inline constexpr std::array<std::string_view, 10> eventNames{
-    "contact", "release", "puncture", "warning", "vital touch", "fire", "fault", "step down", "very near", "fire refused"};
+inline constexpr std::array<std::string_view, 11> eventNames{"contact",     "release",      "puncture",     "warning",
+                                                             "vital touch", "fire",         "fault",        "step down",
+                                                             "very near",   "fire refused", "throw stopped"};
 constexpr std::string_view name(EventKind kind) noexcept
 {
     return eventNames[static_cast<std::size_t>(kind)];

@@ -23,6 +23,7 @@ constexpr double restForce = 2.0;    // force of such a rest [N]
 constexpr double hit = 0.1;          // fraction of target in a core that is worth taking out
 constexpr double offMiddle = 1e-3;   // of the needle's line from the target's middle that is told [m]
 constexpr double refusalSaid = 2.0;  // that the gun did not fire [s]
+constexpr double stopSaid = 4.0;     // that bone stopped its throw [s]
 
 const char* directionInWords(glm::dvec3 way)
 {
@@ -221,6 +222,21 @@ std::string lostTool(const channel::State& state, const CoachView& view)
                      : tr("The tool is outside the picture: the wheel back, or Page up, brings it back");
 }
 
+// What the gun has just done that a figure of the picture does not say, or not for long enough.
+std::string gunFault(const channel::Scenery& scenery, const channel::State& state)
+{
+    const auto within = [&](double moment, double seconds) { return moment >= 0 && state.time - moment < seconds; };
+    const bool inside = state.phase == channel::Phase::inserted;
+    if (within(state.refused, refusalSaid) && state.refusedBy != 0)
+        return said(tr("The gun does not fire against {}: draw back and turn"), tissueCalled(scenery, state.refusedBy));
+    if (within(state.refused, refusalSaid) && !inside)
+        return tr("The gun fires only inside the body");
+    if (within(state.stopped, stopSaid) && inside)
+        return said(tr("The throw was stopped by {} after {:.1Lf} mm"), tissueCalled(scenery, state.stoppedBy),
+                    millimetres(state.thrown));
+    return "";
+}
+
 Coaching coachTask(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
 {
     if (scenery.task == channel::Task::touch)
@@ -240,9 +256,8 @@ Coaching coach(const channel::Scenery& scenery, const channel::State& state, con
     if (state.status == channel::Status::faulted)
         return {1, 1, tr("End the session"), tr("The forces are off"), view.handIsHere};
     Coaching c = coachTask(scenery, state, view);
-    // Figures of a picture say it for longer; who fires too early is to know it at once.
-    if (state.refused >= 0 && state.time - state.refused < refusalSaid && state.phase != channel::Phase::inserted)
-        c.wrong = tr("The gun fires only inside the body");
+    const std::string gun = gunFault(scenery, state);
+    c.wrong = gun.empty() ? c.wrong : gun;
     if (view.outOfSight && view.handIsHere && state.phase == channel::Phase::free && !c.last)
         c.wrong = lostTool(state, view);
     return c;

@@ -58,9 +58,10 @@ public:
         bool alt = false;
     };
     // What else a key needs, added to its windows: a body with a CT or MR, the ultrasound picture that is shown, a scene
-    // with CT or one without, a needle as the tool, a probe that this window may move, one that no scene holds.
+    // with CT or one without, a needle as the tool, a probe that this window may move, one that no scene holds, a body that
+    // is not closed to who looks, and one that is not closed to who holds the tool (Picture::isClosed()).
     static constexpr unsigned ofImage = 16, ofUltrasound = 32, ofCt = 64, ofNeedle = 128, ofProbe = 256, ofFreeProbe = 512,
-                              withoutCt = 1024;
+                              withoutCt = 1024, ofOpenBody = 2048, ofLayouts = 4096;
     struct Key {
         unsigned windows;  // kinds, added up
         const char* shown;

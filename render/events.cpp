@@ -26,8 +26,10 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
                                                : EventKind::touching);
     if (now.cores > before.cores)
         add(EventKind::fired);
+    if (now.stopped > before.stopped)
+        events.push_back({now.time, EventKind::stopped, now.stoppedBy, now.thrown});
     if (now.refused > before.refused)
-        add(EventKind::refused);
+        events.push_back({now.time, EventKind::refused, now.refusedBy, 0});
     if (now.marks > before.marks)
         events.push_back({now.time, EventKind::marked, now.marks, 0});
     if (now.marks < before.marks)
@@ -39,6 +41,11 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
 
 using base::said;
 using base::tr;
+
+std::string tissueCalled(const channel::Scenery& scenery, std::uint32_t row)
+{
+    return base::spokenHere(text(scenery.tissue[std::min<std::size_t>(row, channel::maxTissues - 1)].name));
+}
 
 std::string words(const Event& event, const channel::Scenery& scenery)
 {
@@ -59,8 +66,12 @@ std::string words(const Event& event, const channel::Scenery& scenery)
             return said(tr("touching {}"), structure);
         case EventKind::fired:
             return said(tr("core: {:.0f} % target"), 100 * event.target);
+        case EventKind::stopped:
+            return said(tr("throw stopped by {} after {:.1Lf} mm"), tissueCalled(scenery, event.structure),
+                        1e3 * event.target);
         case EventKind::refused:
-            return tr("fired outside the body");
+            return event.structure == 0 ? tr("fired outside the body")
+                                        : said(tr("fired against {}"), tissueCalled(scenery, event.structure));
         case EventKind::marked:
             return said(tr("mark {}"), event.structure);
         case EventKind::unmarked:

@@ -142,14 +142,14 @@ const std::vector<Controls::Key> Controls::keys{
          c.camera(p.sign > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
      }},
     {every, "R", marked("camera and opacities as at first"), {{0, 'r'}}, onPicture<&Picture::resetView>},
-    {every,
+    {every | ofLayouts,
      "L",
      marked("layout: trainee, instructor"),
      {{0, 'l'}},
      [](Controls& c, const Press&) {
          c.picture_.show(c.picture_.layout() == Layout::trainee ? Layout::instructor : Layout::trainee);
      }},
-    {every,
+    {every | ofOpenBody,
      "C",
      marked("cut towards the tool, whole body"),
      {{0, 'c'}},
@@ -162,12 +162,12 @@ const std::vector<Controls::Key> Controls::keys{
      {{0, 'i'}},
      [](Controls& c, const Press&) { c.picture_.show(following(c.picture_.sliceLook())); }},
     {every | ofImage, "W", marked("the image's grey window"), {{0, 'w'}}, onPicture<&Picture::nextWindow>},
-    {every,
+    {every | ofOpenBody,
      marked("Tab"),
      marked("choose a tissue; with Shift the one before"),
      {{GLFW_KEY_TAB}},
      [](Controls& c, const Press& p) { c.picture_.selectTissue(p.shift ? -1 : 1); }},
-    {every,
+    {every | ofOpenBody,
      "A",
      marked("the tissue more opaque; with Shift less"),
      {{0, 'a'}},
@@ -256,6 +256,7 @@ bool Controls::applies(const Key& key) const
     const bool needle = follower_.session() == nullptr || follower_.session()->scenery().tool == channel::ToolKind::needle;
     return (key.windows & here) != 0 && holds(ofImage, picture_.hasImage()) &&
            holds(ofUltrasound, picture_.ultrasoundShown()) && holds(ofCt, picture_.hasCt()) &&
+           holds(ofOpenBody, !picture_.isClosed()) && holds(ofLayouts, !picture_.isClosed() || (here & held) == 0) &&
            holds(withoutCt, !picture_.hasCt()) && holds(ofNeedle, needle) &&
            holds(ofProbe, !sceneHoldsProbe() || hand_.commands()) && holds(ofFreeProbe, !sceneHoldsProbe());
 }
@@ -303,6 +304,8 @@ std::vector<KeyHelp> Controls::help() const
 
 std::string keysInWords()
 {
+    constexpr unsigned closedTo = Controls::ofOpenBody | Controls::ofLayouts;
+    constexpr unsigned extras = Controls::ofImage | Controls::ofNeedle | Controls::withoutCt | closedTo;
     std::string text;
     for (const auto& [windows, title] : {std::pair{hand, "Where the mouse is the hand (palpate train --device mouse)"},
                                          {held, "Where somebody holds the tool: with mouse, keys or a haptic device"},
@@ -311,10 +314,11 @@ std::string keysInWords()
                                          {every, "In every window"}}) {
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
-            if ((k.windows & ~Controls::ofImage & ~Controls::ofNeedle & ~Controls::withoutCt) == windows)
+            if ((k.windows & ~extras) == windows)
                 text += fmt::format("  {:<18}{}{}\n", k.shown, k.what,
                                     (k.windows & Controls::ofImage) != 0     ? " (of a body with a CT or MR)"
                                     : (k.windows & Controls::withoutCt) != 0 ? " (not of a scene with CT)"
+                                    : (k.windows & closedTo) != 0            ? " (not to a trainee under CT)"
                                                                              : "");
     }
     text += "\nWhile the ultrasound picture is shown:\n";

@@ -31,9 +31,9 @@ namespace {
 // An event as a part of a file's name: "very_near_artery".
 std::string fileWords(const Event& event, const channel::Name& structure)
 {
-    constexpr std::array words{"contact",   "inserted",        "out",   "near",
-                               "very_near", "touching",        "fired", "fire_refused",
-                               "mark",      "mark_taken_back", "fault", "finished"};
+    constexpr std::array words{"contact",         "inserted", "out",           "near",         "very_near",
+                               "touching",        "fired",    "throw_stopped", "fire_refused", "mark",
+                               "mark_taken_back", "fault",    "finished"};
     static_assert(words.size() == static_cast<std::size_t>(EventKind::finished) + 1);
     const bool ofStructure =
         event.kind == EventKind::near || event.kind == EventKind::veryNear || event.kind == EventKind::touching;

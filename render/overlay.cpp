@@ -325,8 +325,8 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     pen.heading(tr("EVENTS"));
     for (auto event = events.rbegin(); event != events.rend() && pen.lines() > 0; ++event) {
         const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
-        const bool warning =
-            event->kind == EventKind::near || event->kind == EventKind::veryNear || event->kind == EventKind::refused;
+        const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear ||
+                             event->kind == EventKind::refused || event->kind == EventKind::stopped;
         const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
         pen.pair(words(*event, scenery), said("{:.1Lf} s", event->time), colour);
     }

@@ -68,7 +68,18 @@ struct Picture::Session {
         factor.fill(1);
     }
 
-    void repaint() { volume.paint(scenery, deformation, factor); }
+    void repaint()
+    {
+        if (closed)
+            volume.paintClosed(scenery, deformation);
+        else
+            volume.paint(scenery, deformation, factor);
+    }
+    void close(bool nowClosed)
+    {
+        if (std::exchange(closed, nowClosed) != nowClosed)
+            repaint();
+    }
     glm::dvec3 aim() const { return deformation.seen(vec(scenery.aim)); }
 
     channel::Scenery scenery;  // as it is shown
@@ -87,7 +98,8 @@ struct Picture::Session {
     channel::State state;
     History history;
     Health health;
-    bool known = false;  // a state has come
+    bool known = false;   // a state has come
+    bool closed = false;  // only the outside is painted
     channel::Displaced shape;
     VoxelBox changed;  // since the last slices
 };
@@ -295,7 +307,8 @@ void Picture::finish(std::chrono::steady_clock::time_point began)
 void Picture::openBody()
 {
     Session& s = *session_;
-    if (!cut_) {
+    s.close(isClosed());
+    if (!cut_ || s.closed) {
         s.volume.uncut();
         return;
     }

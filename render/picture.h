@@ -100,6 +100,9 @@ public:
     const UltrasoundPicture& ultrasound() const noexcept { return ultrasound_; }
     /// Whether the scene is guided by CT. The last scan is shown where others have the ultrasound picture.
     bool hasCt() const noexcept { return ct_.opened(); }
+    /// Whether only the body's outside is shown: to the trainee of such a scene, to whom a look inside costs a scan.
+    /// Records and the instructor's layout show all.
+    bool isClosed() const noexcept { return hasCt() && layout_ == Layout::trainee && recorded_ == nullptr; }
     void nextCtWindow() noexcept { ct_.nextWindow(); }
     /// Camera and opacities as they were when the session was opened.
     void resetView();

@@ -196,9 +196,18 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
 
 void ToolPicture::addPlan(const channel::Scenery& scenery, vtkRenderer& renderer)
 {
-    const glm::dvec3 entry = vec(scenery.entry) * mm, aim = vec(scenery.aim) * mm;
+    glm::dvec3 entry = vec(scenery.entry) * mm;
+    const glm::dvec3 aim = vec(scenery.aim) * mm;
     if (glm::distance(entry, aim) < 1e-3)
         return;
+    // A closed body (Picture::isClosed()) hides all of the line: it begins in the air, and a ball stands where it goes in.
+    if (scenery.ctSlices > 0) {
+        constexpr double outside = 20.0;  // [mm]
+        vtkNew<vtkActor> mark;
+        show(renderer, *mark, ball(1.3), planColour);
+        mark->SetPosition(entry.x, entry.y, entry.z);
+        entry -= outside * glm::normalize(aim - entry);
+    }
     vtkNew<vtkAppendPolyData> dashes;
     constexpr int count = 12;
     for (int i = 0; i < count; ++i) {

@@ -164,6 +164,19 @@ void VolumePicture::paint(const channel::Scenery& scenery, const Deformation& de
     image_->Modified();
 }
 
+void VolumePicture::paintClosed(const channel::Scenery& scenery, const Deformation& deformation)
+{
+    const auto labels = deformation.labels();
+    const auto& skin = scenery.tissue[1].colour;  // of the first tissue, which that of the outside is
+    auto* pixels = static_cast<std::array<std::uint8_t, 4>*>(image_->GetScalarPointer());
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        const float light = static_cast<float>(light_[i]) / 255;
+        pixels[i] = {byteOf(light * skin[0]), byteOf(light * skin[1]), byteOf(light * skin[2]),
+                     byteOf(rowOf(scenery, labels[i]) == 0 ? 0.0F : 1.0F)};
+    }
+    image_->Modified();
+}
+
 void VolumePicture::teachShader()
 {
     vtkShaderProperty& shader = *volume_->GetShaderProperty();

@@ -45,6 +45,8 @@ public:
     /// Draws the tissues anew, their opacity in the table times `factor` per row.
     void paint(const channel::Scenery& scenery, const Deformation& deformation,
                const std::array<float, channel::maxTissues>& factor);
+    /// Draws the outside alone: all of the body in the colour of its skin, and opaque.
+    void paintClosed(const channel::Scenery& scenery, const Deformation& deformation);
     /// Shows only what lies behind the plane through `point` [m], seen from where `normal` points to.
     void cut(glm::dvec3 point, glm::dvec3 normal);
     void uncut() { cutNormal_ = glm::dvec3(0.0); }

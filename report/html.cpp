@@ -322,7 +322,10 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
         case EventKind::stepDown:
             return "simpler model: ticks came late";
         case EventKind::fireRefused:
-            return "fired outside the body: no core";
+            return e.tissue == 0 ? "fired outside the body: no core"
+                                 : fmt::format("fired against {}: no core", nameOf(info.tissues, e.tissue));
+        case EventKind::throwStopped:
+            return fmt::format("throw stopped by {} after {:.1f} mm", nameOf(info.tissues, e.tissue), e.value * 1e3);
     }
     return {};
 }

@@ -41,11 +41,13 @@ std::unique_ptr<Device> openHand(const SessionModel& model, const DeviceRequest&
     return std::make_unique<haptics::HandDevice>(haptics::handBefore(model, startDistance));
 }
 
-std::unique_ptr<Device> openMouse(const SessionModel& model, const DeviceRequest&, const Broadcast* broadcast)
+std::unique_ptr<Device> openMouse(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
 {
     assert(broadcast != nullptr);
-    return std::make_unique<haptics::MouseDevice>(haptics::mouseBefore(
-        model, [broadcast] { return broadcast->input(); }, startDistance));
+    const auto source = [broadcast] { return broadcast->input(); };
+    return std::make_unique<haptics::MouseDevice>(
+        request.offPlan ? haptics::mouseOffPlan(model, source, startDistance, *request.offPlan)
+                        : haptics::mouseBefore(model, source, startDistance));
 }
 
 // A haptic device in the one hand, what guides it in the other, at a viewer: ultrasound probe, stored pictures, CT scans.

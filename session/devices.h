@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,6 +20,7 @@ struct DeviceRequest {
     std::string trainee;                     // whose hand it is, see haptics/trainee.h; empty: the scene's script
     std::uint64_t seed = 1;                  // of the trainee's errors
     std::shared_ptr<falcon::Driver> falcon;  // of "falcon": ready
+    std::optional<std::uint64_t> offPlan{};  // of "mouse": it begins beside the plan, where this seed says
 };
 
 /// A kind of device that a session can have. The one list of them: commands, their help and sessions go by it.

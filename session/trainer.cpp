@@ -3,11 +3,13 @@
 #include <base/end_in_order.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
+#include <haptics/interrupted.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <signal.h>
+#include <string.h>
 #include <unistd.h>
 
 #include <array>
@@ -169,7 +171,11 @@ struct Trainer::Impl {
     void conclude(TrainResult& result)
     {
         if (recorder) {
-            recorder->finish(resultsOf(result));
+            auto results = resultsOf(result);
+            if (result.signal != 0) {
+                results.emplace_back(haptics::interruptedKey, strsignal(result.signal));
+            }
+            recorder->finish(results);
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();
             result.recordCut = !recorder->whole();

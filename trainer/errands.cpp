@@ -337,8 +337,9 @@ struct Errands::Impl {
             result.fault = result.fault.empty() && session->failed() ? session->message() : result.fault;
         }
         session.reset();
+        const bool left = state.person.empty() || !dropErased(state.files, result);
         sessionEnded(state, result);  // also where it cannot be kept
-        if (scored) {
+        if (scored && left) {
             sink.keep(chosenCase(state), state.files, result);
         }
         return true;

@@ -172,6 +172,18 @@ Result readResult(const fs::path& figures)
     return result;
 }
 
+bool dropErased(const SessionFiles& files, Result& result)
+{
+    std::error_code failed;
+    if (!result.problem.empty() || fs::exists(files.record, failed)) {
+        return false;
+    }
+    fs::remove(files.figures, failed);
+    result = {};
+    result.problem = tr("The profile was erased while this session ran, and its record with it: nothing of it is kept.");
+    return true;
+}
+
 DeviceCheck readDevices(const fs::path& figures)
 {
     DeviceCheck check;

@@ -10,6 +10,9 @@ namespace palpate::trainer {
 
 /// What `palpate train --json` wrote. A file that is not there or says no score is a result with a problem.
 Result readResult(const std::filesystem::path& figures);
+/// A person who was erased while the session ran has lost its record, and is to leave no figures: removes them, and says it
+/// in place of a result. False where the record is there, or there is no score.
+bool dropErased(const SessionFiles& files, Result& result);
 /// What `palpate devices --json` wrote.
 DeviceCheck readDevices(const std::filesystem::path& figures);
 

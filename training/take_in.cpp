@@ -5,6 +5,7 @@
 #include <base/error.h>
 #include <base/split.h>
 #include <datasets/scene_text.h>
+#include <haptics/interrupted.h>
 #include <haptics/measures.h>
 
 #include <algorithm>
@@ -73,6 +74,8 @@ StoredSession sessionOf(const std::filesystem::path& file)
     if (seal.state == haptics::Seal::State::broken) {
         throw base::error("{}: was changed after it was closed: {}", file.native(), seal.changed.front());
     }
+    const std::string interrupted = record.result(haptics::interruptedKey);
+    base::failIf(!interrupted.empty(), "{}: was interrupted ({}): this session does not count", file.native(), interrupted);
     const haptics::SessionInfo& info = record.info();
     StoredSession s;
     s.started = info.started;

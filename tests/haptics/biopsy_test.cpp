@@ -122,5 +122,55 @@ TEST(Biopsy, NeedleFeelsTheHole)
     EXPECT_NEAR(behind, fat.cuttingForce + fat.frictionPerMetre * whole.tip.needle.inserted, 0.03);
 }
 
+// Liver behind a rib that lies 18 to 26 mm deep.
+const SessionModel& ribbed()
+{
+    static const auto model =
+        tests::boxOf(tests::layers({{"fat", 18e-3}, {"rib", 8e-3}, {"liver", 1}}), "liver", tests::chainmailOnly);
+    return model;
+}
+
+// Bone ends the throw where it begins, and the core is what the notch has passed until then: nothing from behind it.
+TEST(Biopsy, AThrowEndsAtBoneAndBringsNothingFromBehindIt)
+{
+    const LoneNeedle needle(ribbed());
+    const auto rib = static_cast<std::uint8_t>(row(ribbed(), "rib"));
+    for (const double depth : {8e-3, 13e-3}) {
+        const Vec3 tip(0, depth, 0);
+        const Throw thrown = throwOf(ribbed(), needle.reader, needle.body, tip, tip, {0, 1, 0});
+        EXPECT_EQ(thrown.bone, rib);
+        EXPECT_FALSE(thrown.isBlocked());
+        EXPECT_NEAR(thrown.length, 18e-3 - depth, 0.02e-3);
+        const auto core = takeCore(ribbed(), needle.reader, needle.body, {}, tip, {0, 1, 0}, thrown.length);
+        EXPECT_NEAR(glm::distance(core.notchStart, tip), 0.0, 1e-12);
+        EXPECT_DOUBLE_EQ(core.notchEnd.y, depth + thrown.length);
+        EXPECT_EQ(core.targetFraction, 0.0);
+        EXPECT_DOUBLE_EQ(core.fraction[row(ribbed(), "fat")], 1.0);
+        EXPECT_NEAR(core.volume, notchVolume(ribbed()) * thrown.length / ribbed().scene.tool.notchLength, 1e-15);
+    }
+    // Aslant the way to the rib is twice as long.
+    const Vec3 axis(std::sin(std::numbers::pi / 3), std::cos(std::numbers::pi / 3), 0);
+    EXPECT_NEAR(throwOf(ribbed(), needle.reader, needle.body, {0, 8e-3, 0}, {0, 8e-3, 0}, axis).length, 20e-3, 0.04e-3);
+    // Without bone it is whole, and bone behind the tip does not matter.
+    const LoneNeedle soft(plate());
+    EXPECT_EQ(throwOf(plate(), soft.reader, soft.body, {}, {}, {0, 1, 0}).length, plate().scene.tool.throwLength);
+    EXPECT_EQ(throwOf(ribbed(), needle.reader, needle.body, {0, 28e-3, 0}, {0, 28e-3, 0}, {0, 1, 0}).bone, 0);
+}
+
+// A tip that is in bone, or touches it, or is pressed into it and through it, is blocked: where the proxy is counts.
+TEST(Biopsy, ATipAtBoneIsBlocked)
+{
+    const LoneNeedle needle(ribbed());
+    const auto blocked = [&](double proxy, double tip) {
+        return throwOf(ribbed(), needle.reader, needle.body, {0, proxy, 0}, {0, tip, 0}, {0, 1, 0}).isBlocked();
+    };
+    EXPECT_TRUE(blocked(17.8e-3, 17.8e-3));
+    EXPECT_TRUE(blocked(22e-3, 22e-3));
+    EXPECT_TRUE(blocked(17.8e-3, 28e-3));
+    EXPECT_TRUE(blocked(10e-3, 28e-3));
+    EXPECT_FALSE(blocked(16.8e-3, 16.8e-3));
+    EXPECT_FALSE(blocked(28e-3, 28e-3));
+}
+
 }  // namespace
 }  // namespace palpate::haptics

@@ -258,6 +258,35 @@ TEST(Losses, AShotOutsideTheBodyIsNoGunThatWasNotFired)
               "-75 points: The gun was fired only outside the body: there is no core (at 0.2 s)");
 }
 
+// Who fires with the tip at a rib is told of the rib; a core that a rib has cut short says so.
+TEST(Losses, SayWhatBoneDidToAShot)
+{
+    SessionInfo info = synthetic::info();
+    info.tissues = {"air", "liver", "rib"};
+    const auto wordsAfter = [&](EventKind kind, double value, bool fired) {
+        LossWatch watch(info);
+        for (std::uint64_t n = 0; n < 1000; ++n) {
+            TickRecord tick;
+            tick.tick = n;
+            tick.phase = n < 200 ? Phase::contact : Phase::inserted;
+            tick.inserted = n < 200 ? 0 : 0.02;
+            tick.distance = {1, 1, 1};
+            if (n == 500) {
+                tick.fired = fired;
+                synthetic::addEvent(tick, synthetic::event(EventKind::fire, 0, 1, 8e-3));
+                synthetic::addEvent(tick, synthetic::event(kind, 0xFF, 2, value));
+            }
+            watch.add(tick);
+        }
+        return inWords(watch.losses(info)[0]);
+    };
+    EXPECT_EQ(wordsAfter(EventKind::fireRefused, 0, false),
+              "-75 points: The gun was fired only with the tip at rib: there is no core (at 0.5 s)");
+    EXPECT_NE(wordsAfter(EventKind::throwStopped, 3.2e-3, true).find("; its throw was stopped by rib after 3.2 mm"),
+              std::string::npos);
+    EXPECT_EQ(wordsAfter(EventKind::puncture, 3.2e-3, true).find("stopped"), std::string::npos);
+}
+
 TEST(Losses, OfEveryTaskAddUpToAHundredWithTheTotal)
 {
     std::mt19937_64 random(5);

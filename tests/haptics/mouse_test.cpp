@@ -266,5 +266,31 @@ TEST(Mouse, ADeadViewersHandFadesToZero)
     EXPECT_LT(glm::distance(device.read().position, resting), 5e-3);
 }
 
+// In a test the tool waits beside the plan and oblique to it, its line past the target; the seed says where.
+TEST(Mouse, InATestTheToolBeginsBesideThePlan)
+{
+    const auto& model = tests::layeredNeedle();
+    const auto& [entry, aim, planned] = model.approach;
+    constexpr double distance = 30e-3;
+    Vec3 sum(0.0);
+    for (std::uint64_t seed = 0; seed < 50; ++seed) {
+        const Start start = startOffPlan(model, distance, seed);
+        const Vec3 off = start.tip - entry;
+        const double aside = std::hypot(off.x, off.z);
+        const double degrees = std::acos(start.axis.y) * 180.0 / 3.14159265358979;
+        EXPECT_TRUE(aside > 14.9e-3 && aside < 25.1e-3) << aside;
+        EXPECT_TRUE(degrees > 9.9 && degrees < 20.1) << degrees;
+        EXPECT_NEAR(off.y, -distance, 1e-3);
+        const Vec3 way = aim - start.tip;
+        EXPECT_GT(glm::length(way - glm::dot(way, start.axis) * start.axis), 14.9e-3);
+        EXPECT_EQ(startOffPlan(model, distance, seed).tip, start.tip);
+        MouseDevice device = mouseOffPlan(
+            model, [] { return std::nullopt; }, distance, seed);
+        EXPECT_LT(glm::distance(run(device, 10).position, start.tip), 0.1e-3) << "to the steps of its encoders";
+        sum += off / 50.0;
+    }
+    EXPECT_LT(std::hypot(sum.x, sum.z), 8e-3) << "to no side more often";
+}
+
 }  // namespace
 }  // namespace palpate::haptics

@@ -1,4 +1,5 @@
 #include "models.h"
+#include "slabs.h"
 
 #include <haptics/broadcast.h>
 #include <haptics/score.h>
@@ -10,6 +11,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace palpate::haptics {
@@ -46,6 +48,40 @@ TEST(Shots, AreRefusedOutsideTheBody)
     EXPECT_EQ(simulation.record().phase, Phase::contact);
     EXPECT_EQ(refusals, 2);
     EXPECT_EQ(shown.cores, 0U);
+}
+
+// Before a rib a throw ends, with one event that says how far it got; with the tip at the rib there is no shot.
+TEST(Shots, EndAtBoneAndAreRefusedThere)
+{
+    const auto model = tests::boxOf(tests::layers({{"fat", 18e-3}, {"rib", 8e-3}, {"liver", 1}}), "liver");
+    const auto rib = static_cast<std::uint8_t>(*model.tissue->table().find("rib"));
+    for (const auto& [deepest, fires] : {std::pair{12e-3, true}, {24e-3, false}}) {
+        Simulation simulation(model);
+        channel::State shown;
+        for (double tip = -5e-3; tip < deepest; tip += 20e-6) {
+            simulation.tick({.position = {0, tip, 0}, .buttons = buttonDeadMan});
+        }
+        const TickRecord& r = simulation.tick({.position = {0, deepest, 0}, .buttons = buttonDeadMan | buttonFire});
+        showTick(r, {}, shown);
+        EXPECT_EQ(r.phase, Phase::inserted);
+        EXPECT_EQ(r.fired, fires);
+        EXPECT_EQ(shown.cores, fires ? 1U : 0U);
+        const auto events = std::span(r.events).first(r.eventCount);
+        const auto stop = std::ranges::find(events, EventKind::throwStopped, &Event::kind);
+        const auto refusal = std::ranges::find(events, EventKind::fireRefused, &Event::kind);
+        ASSERT_EQ(stop != events.end(), fires);
+        ASSERT_EQ(refusal != events.end(), !fires);
+        EXPECT_EQ(fires ? stop->tissue : refusal->tissue, rib);
+        EXPECT_EQ(fires ? shown.stoppedBy : shown.refusedBy, rib);
+        EXPECT_EQ(shown.stopped >= 0, fires);
+        EXPECT_EQ(shown.refused >= 0, !fires);
+        if (fires) {
+            EXPECT_NEAR(stop->value, 6e-3, 1.5e-3);
+            EXPECT_EQ(shown.thrown, stop->value);
+            EXPECT_EQ(r.core.targetFraction, 0.0);
+            EXPECT_NEAR(glm::distance(r.tip(), r.core.notchEnd), stop->value, 0.05e-3);
+        }
+    }
 }
 
 // The best core stays the best, whatever comes after it.

@@ -1,6 +1,7 @@
 #include <render/coach.h>
 #include <render/concealment.h>
 #include <render/deformation.h>
+#include <render/events.h>
 #include <tests/render/body.h>
 
 #include <gtest/gtest.h>
@@ -185,6 +186,32 @@ TEST(Coach, SaysForTwoSecondsThatTheGunFiresOnlyInside)
     s.time = 0.6;
     s.phase = channel::Phase::inserted;
     EXPECT_NE(coach(needleScenery(), s, view).wrong, "The gun fires only inside the body");
+}
+
+// At bone the gun does not fire, and a throw that bone has stopped is told for four seconds; inside the body both.
+TEST(Coach, SaysWhatBoneDidToAShot)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.tissue[3].name = named("rib");
+    channel::State s = stateAt(0, 5e-3, 0, channel::Phase::inserted);
+    s.time = s.refused = 0.5;
+    s.refusedBy = 3;
+    EXPECT_EQ(coach(scenery, s, view).wrong, "The gun does not fire against rib: draw back and turn");
+    s.time = 2.6;
+    EXPECT_EQ(coach(scenery, s, view).wrong.find("rib"), std::string::npos);
+    s.stopped = s.time;
+    s.stoppedBy = 3;
+    s.thrown = 3.2e-3;
+    s.time = 6.5;
+    EXPECT_EQ(coach(scenery, s, view).wrong, "The throw was stopped by rib after 3.2 mm");
+    s.time = 6.7;
+    EXPECT_EQ(coach(scenery, s, view).wrong.find("rib"), std::string::npos);
+    std::vector<std::string> said;
+    channel::State now = s;
+    now.stopped = now.refused = now.time;
+    for (const Event& event : eventsBetween(s, now))
+        said.push_back(words(event, scenery));
+    EXPECT_EQ(said, (std::vector<std::string>{"throw stopped by rib after 3.2 mm", "fired against rib"}));
 }
 
 TEST(Coach, APalpationAsksForTwoMarksAndSaysNothingOfTheLump)

@@ -49,6 +49,22 @@ TEST(Keys, NoneShowsAnUltrasoundPictureWhereTheSceneHasCt)
     }
 }
 
+// Layout, cut and opacity are the ways into a body that is closed.
+TEST(Keys, NoneOpensABodyThatIsClosedToATrainee)
+{
+    int guarded = 0;
+    for (const Controls::Key& key : Controls::keys) {
+        const std::string what = key.what;
+        const bool opens =
+            what.starts_with("layout") || what.starts_with("cut") || what.find("tissue") != std::string::npos;
+        const bool ofSlices = (key.windows & Controls::ofImage) != 0 || (key.windows & Controls::ofCt) != 0;
+        const bool isGuarded = (key.windows & (Controls::ofOpenBody | Controls::ofLayouts)) != 0;
+        EXPECT_EQ(opens && !ofSlices, isGuarded) << key.shown << ": " << what;
+        guarded += isGuarded ? 1 : 0;
+    }
+    EXPECT_EQ(guarded, 4);
+}
+
 // The page has what `palpate-view --keys` prints, and so each key of the list.
 TEST(Keys, ThePageHasAllOfThem)
 {

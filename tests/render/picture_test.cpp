@@ -260,6 +260,42 @@ TEST_F(PictureTest, WithoutTheCutTheBodyHidesWhatIsInside)
     EXPECT_EQ(open.differing(studio->grab(), view), 0);
 }
 
+// Under CT a look inside costs a scan: the trainee's picture of a session has the outside alone, whatever is cut or made
+// clear. The instructor's has all, and so has a record.
+TEST_F(PictureTest, UnderCtTheBodyIsClosedToTheTrainee)
+{
+    const channel::Scenery scenery = inAScanner(studio->scenery);
+    const Area view = ScreenPlan(width, height, Layout::trainee, 1, true).view;
+    constexpr Pixel tumour{140, 64, 191}, background{15, 18, 26};
+    Picture& picture = studio->picture();
+    picture.open(scenery, studio->labels, "story");
+    const auto tumourIn = [&](const std::string& name) {
+        picture.update(storyState(scenery, 4.2), nullptr, {30, 0.02, 1000});
+        picture.render(Quality::still);
+        picture.render(Quality::still);
+        const Image now = studio->grab(name);
+        EXPECT_LT(now.count(view, background, 6), view.width * view.height * 3 / 4) << name << ": there is a body";
+        return now.count(view, tumour, 40);
+    };
+    picture.show(Layout::trainee);
+    EXPECT_TRUE(picture.isClosed());
+    EXPECT_EQ(tumourIn("ct-closed"), 0);
+    for (int i = 0; i < 3; ++i) {
+        picture.selectTissue(1);
+        picture.changeOpacity(0.05);
+    }
+    EXPECT_EQ(tumourIn("ct-closed-clear"), 0);
+    picture.resetView();
+    picture.show(Layout::instructor);
+    EXPECT_FALSE(picture.isClosed());
+    picture.show(Layout::trainee);
+    const Recorded record;
+    picture.setRecorded(&record);
+    EXPECT_FALSE(picture.isClosed());
+    EXPECT_GT(tumourIn("ct-record"), 100);
+    picture.setRecorded(nullptr);
+}
+
 TEST_F(PictureTest, HelpAndCaptionCoverNothingWhenTheyAreGone)
 {
     const Image before = studio->take(0.05, Layout::trainee);

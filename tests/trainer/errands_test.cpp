@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <tuple>
 
 namespace palpate::trainer {
 using tests::Folder;
@@ -328,6 +329,38 @@ echo '{"score": {"total": 71, "points": {"core": 50, "vital": 21, "technique": 0
     state.notice.clear();
     errands.look(state);
     EXPECT_EQ(state.notice, "") << "it is said once";
+}
+
+// The profile is erased in a terminal while its session runs: figures that are written afterwards are not left, nothing can
+// be watched, and the case has no points from it. With the record there, or of nobody, the session is as any other.
+TEST(Errands, ASessionWhoseProfileWasErasedLeavesNothing)
+{
+    for (const auto& [person, recorded, left] :
+         {std::tuple{"anna", false, false}, {"anna", true, true}, {"", false, true}}) {
+        const Folder folder;
+        makeScript(folder / "palpate", std::string(R"(for last; do
+  if [ "$before" = --record ] && [ -n ")") +
+                                           (recorded ? "yes" : "") +
+                                           R"(" ]; then echo > "$last"; fi
+  before="$last"
+done
+echo '{"problem": "anna: there is no such profile", "kept": true,
+       "score": {"total": 71, "points": {"core": 50, "vital": 21, "technique": 0}}}' > "$last")");
+        SessionFolder sink(folder / "sessions");
+        Errands errands(folder.path(), sink);
+        State state;
+        state.cases = {caseCalled("a")};
+        state.person = person;
+        errands.run(Errand::startSession, state);
+        ASSERT_TRUE(state.running) << state.notice;
+        lookUntil(errands, state, [&] { return !state.running; });
+        EXPECT_EQ(state.result.problem.empty(), left) << state.result.problem;
+        EXPECT_EQ(std::filesystem::exists(state.files.figures), left);
+        EXPECT_EQ(state.cases[0].best.has_value(), left);
+        EXPECT_EQ(sink.best(state.cases[0]).has_value(), left);
+        EXPECT_EQ(debrief(state) == Errand::startDebrief, left);
+        EXPECT_EQ(state.result.fault.empty(), !left);
+    }
 }
 
 }  // namespace
