@@ -18,12 +18,23 @@ namespace palpate::haptics::format {
 
 namespace {
 
-void removeLogs(const std::string& file) noexcept
+// A log with something in it; empty: none.
+std::string logOf(const std::string& file)
 {
-    std::error_code ignored;
-    for (const char* suffix : {"-wal", "-shm", "-journal"}) {
-        std::filesystem::remove(file + suffix, ignored);
+    for (const char* suffix : {"-wal", "-journal"}) {
+        std::error_code none;
+        const auto bytes = std::filesystem::file_size(file + suffix, none);
+        if (!none && bytes > 0) {
+            return file + suffix;
+        }
     }
+    return {};
+}
+
+void checkName(const std::string& file)
+{
+    const std::string why = nameTaken(file);
+    base::failIf(!why.empty(), "{}: {}", file, why);
 }
 
 void writeInfo(Database& database, const SessionInfo& info)
@@ -54,8 +65,8 @@ void giveName(const std::string& part, const std::string& file)
     if (failed == EINVAL && !std::filesystem::exists(file)) {  // a file system that cannot refuse by itself
         failed = std::rename(part.c_str(), file.c_str()) == 0 ? 0 : errno;
     }
-    base::failIf(failed == EEXIST || failed == EINVAL, "{}: exists already; choose another name or remove it", file);
     if (failed != 0) {
+        checkName(file);
         refuse(file, std::strerror(failed));
     }
 }
@@ -65,8 +76,9 @@ void giveName(const std::string& part, const std::string& file)
 void removeFile(const std::string& file) noexcept
 {
     std::error_code ignored;
-    std::filesystem::remove(file, ignored);
-    removeLogs(file);
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+        std::filesystem::remove(file + suffix, ignored);
+    }
 }
 
 void refuse(const std::string& file, const std::string& why)
@@ -76,7 +88,7 @@ void refuse(const std::string& file, const std::string& why)
 
 void makeFile(const std::string& file, const SessionInfo& info)
 {
-    base::failIf(std::filesystem::exists(file), "{}: exists already; choose another name or remove it", file);
+    checkName(file);
     const std::string part = file + "." + std::to_string(::getpid()) + ".part";
     removeFile(part);
     try {
@@ -94,8 +106,8 @@ void makeFile(const std::string& file, const SessionInfo& info)
         refuse(file, e.what());
     }
     try {
+        checkName(file);  // a log that lies there would be taken for this record's
         giveName(part, file);
-        removeLogs(file);  // of a record that was removed while it was written: they would be taken for this one's
     } catch (const std::exception&) {
         removeFile(part);
         throw;
@@ -109,3 +121,23 @@ FileId fileId(const std::filesystem::path& file) noexcept
 }
 
 }  // namespace palpate::haptics::format
+
+namespace palpate::haptics {
+
+std::string nameTaken(const std::filesystem::path& file)
+{
+    const std::string log = format::logOf(file.string());
+    std::error_code failed;
+    if (std::filesystem::exists(file, failed)) {
+        return log.empty() ? "exists already; choose another name or remove it"
+                           : "exists already, and " + log + " is part of it; choose another name, or move or remove both";
+    }
+    if (log.empty()) {
+        return {};
+    }
+    const std::string suffix = log.substr(file.string().size());
+    return log + " is there without it: it belongs to a record of that name that was moved, and only both together are " +
+           "whole; give it the record's new name and " + suffix + ", or choose another name";
+}
+
+}  // namespace palpate::haptics

@@ -17,7 +17,7 @@ namespace palpate::haptics::format {
 /// Makes a record without ticks under another name first, so that the file is there whole or not at all.
 void makeFile(const std::string& file, const SessionInfo& info);
 
-/// Removes a record that was made here, with its logs.
+/// Removes what was made here, with its logs.
 void removeFile(const std::string& file) noexcept;
 
 /// Which file a name is, so that it can be told whether the name still is that file's.
