@@ -36,8 +36,11 @@ using format::Writer;
 namespace {
 
 constexpr std::chrono::milliseconds commitPeriod{100};
+constexpr int lockedWait = 100;  // between two looks at a file that another program has locked [ms]
+constexpr std::chrono::seconds shortLock{2}, longestLock{10};
 constexpr std::size_t ticksPerTransaction = 4096;  // bounds the write-ahead log
 
+using Clock = std::chrono::steady_clock;
 using Results = std::vector<std::pair<std::string, std::string>>;
 
 // The writer thread takes no signals; one about the size of files (RLIMIT_FSIZE) would end the process.
@@ -81,7 +84,9 @@ struct Recorder::Impl {
     std::string error;
     std::string unfolded;  // why the log of a whole record is still there; empty: it is not, or a reader keeps it
     std::thread thread;
-    bool closed = false;  // of that thread: all that was written is sealed
+    // Of that thread:
+    bool closed = false;                           // all that was written is sealed
+    std::optional<Clock::time_point> lockedSince;  // by another program
 
     // The ring holds eight seconds at the session's rate, and never less than eight at 1 kHz.
     Impl(const std::string& path, const SessionInfo& info)
@@ -101,6 +106,7 @@ struct Recorder::Impl {
             // left to the end: a sync may take a second on a busy disk.
             database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
             database->execute("UPDATE session SET value = value");
+            sqlite3_busy_timeout(database->get(), lockedWait);
             writer.emplace(*database, format::columnsOf(info));
             const SignalsBlocked inherited;
             thread = std::thread([this] { work(); });
@@ -119,9 +125,10 @@ struct Recorder::Impl {
             const std::uint64_t request = requests;
             const std::optional<Results> toFinish = std::exchange(results, std::nullopt);
             last = stopping;
+            const bool awaited = last || request > answered;
             const bool failed = !error.empty();
             lock.unlock();
-            std::string problem = failed ? drop() : store(toFinish, last);
+            std::string problem = failed ? drop() : store(toFinish, last, awaited);
             std::string apart = toFinish && closed ? fold() : std::string();
             lock.lock();
             if (!problem.empty()) {
@@ -142,8 +149,29 @@ struct Recorder::Impl {
         return {};
     }
 
+    // Begins to write. False while another program has the file locked: ticks then wait in the ring, until that is nearly
+    // full. Where somebody waits for the file, it is tried for ten seconds.
+    bool begin(bool awaited)
+    {
+        for (const auto first = Clock::now();;) {
+            const int kind = sqlite3_exec(database->get(), "BEGIN IMMEDIATE", nullptr, nullptr, nullptr) & 0xFF;
+            if (kind == SQLITE_OK) {
+                lockedSince.reset();
+                return true;
+            }
+            const auto now = Clock::now();
+            lockedSince = lockedSince.value_or(first);
+            const bool nearlyFull = ring.write_available() < (ring.write_available() + ring.read_available()) / 16;
+            const bool enough = awaited ? now - first > longestLock : nearlyFull && now - *lockedSince > shortLock;
+            base::failIf((kind != SQLITE_BUSY && kind != SQLITE_LOCKED) || enough, "{}", sqlite3_errmsg(database->get()));
+            if (!awaited) {
+                return false;
+            }
+        }
+    }
+
     // Returns what went wrong, or nothing.
-    std::string store(const std::optional<Results>& toFinish, bool last) noexcept
+    std::string store(const std::optional<Results>& toFinish, bool last, bool awaited) noexcept
     {
         std::size_t taken = 0;
         try {
@@ -153,7 +181,9 @@ struct Recorder::Impl {
                     break;
                 }
                 closed = false;
-                database->execute("BEGIN IMMEDIATE");
+                if (!begin(awaited)) {
+                    return {};
+                }
                 while (taken < ticksPerTransaction && ring.consume_one([&](const TickRecord& r) {
                     writer->write(r);
                     ++taken;
@@ -178,7 +208,8 @@ struct Recorder::Impl {
 
     void complete(const Results& values)
     {
-        database->execute("BEGIN IMMEDIATE; DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
+        begin(true);
+        database->execute("DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
         insertPair(*database, "session", "complete", std::int64_t{1});
         insertPair(*database, "session", "lost_ticks", static_cast<std::int64_t>(lost.load()));
         for (const auto& [key, value] : values) {
@@ -192,6 +223,7 @@ struct Recorder::Impl {
     // good: the reader leaves the file all that it needs. Returns what is to be done where there is no room for it.
     std::string fold() noexcept
     {
+        sqlite3_busy_timeout(database->get(), 2000);  // a reader may be at work just now
         int status = sqlite3_wal_checkpoint_v2(database->get(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
         if (status == SQLITE_OK) {
             status = sqlite3_exec(database->get(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
