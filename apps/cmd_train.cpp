@@ -167,8 +167,9 @@ void checkOutputs(const TrainArguments& o)
     }
     const auto record = recordFile(o);
     base::checkOutputs({o.json, record}, {});
-    base::failIf(!record.empty() && fs::exists(record), "{}: exists already; choose another name or remove it{}",
-                 record.native(), o.record.empty() ? " (the record beside the report)" : "");
+    const std::string taken = record.empty() ? std::string() : haptics::nameTaken(record);
+    base::failIf(!taken.empty(), "{}: {}{}", record.native(), taken,
+                 o.record.empty() ? " (the record beside the report)" : "");
     base::failIf(!o.report.empty() && record == fs::path(o.report),
                  "{}: is the name of the record too: call the report .html", o.report);
 }

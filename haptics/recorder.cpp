@@ -1,26 +1,21 @@
 #include <base/error.h>
 #include <base/shell_word.h>
 #include <haptics/record_bounds.h>
+#include <haptics/record_file.h>
 #include <haptics/record_format.h>
+#include <haptics/record_writer.h>
 #include <haptics/recorder.h>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
-#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <condition_variable>
-#include <cstdio>
-#include <cstring>
 #include <exception>
-#include <iterator>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -30,229 +25,23 @@
 namespace palpate::haptics {
 
 using format::Database;
-using format::Statement;
+using format::FileId;
+using format::fileId;
+using format::insertPair;
+using format::makeFile;
+using format::refuse;
+using format::removeFile;
+using format::Writer;
 
 namespace {
 
 constexpr std::chrono::milliseconds commitPeriod{100};
+constexpr int lockedWait = 100;  // between two looks at a file that another program has locked [ms]
+constexpr std::chrono::seconds shortLock{2}, longestLock{10};
 constexpr std::size_t ticksPerTransaction = 4096;  // bounds the write-ahead log
 
+using Clock = std::chrono::steady_clock;
 using Results = std::vector<std::pair<std::string, std::string>>;
-
-void removeLogs(const std::string& file) noexcept
-{
-    std::error_code ignored;
-    for (const char* suffix : {"-wal", "-shm", "-journal"}) {
-        std::filesystem::remove(file + suffix, ignored);
-    }
-}
-
-void removeFile(const std::string& file) noexcept
-{
-    std::error_code ignored;
-    std::filesystem::remove(file, ignored);
-    removeLogs(file);
-}
-
-void insertPair(Database& database, const char* table, std::string_view key, const auto& value)
-{
-    Statement(database, std::string("INSERT INTO ") + table + " VALUES (?, ?)", key, value).run();
-}
-
-void writeInfo(Database& database, const SessionInfo& info)
-{
-    const auto put = [&](std::string_view key, const auto& value) { insertPair(database, "session", key, value); };
-    for (const auto& [key, text] : format::infoTexts) {
-        put(key, info.*text);
-    }
-    put("rate_hz", info.rate);
-    put("seed", std::to_string(info.seed));
-    for (const auto& [key, value] : info.extra) {
-        put("extra." + key, value);
-    }
-    for (std::size_t i = 0; i < info.structures.size(); ++i) {
-        Statement(database, "INSERT INTO structures VALUES (?, ?, ?)", static_cast<std::int64_t>(i), info.structures[i],
-                  i < info.warnDistances.size() ? info.warnDistances[i] : 0.0)
-            .run();
-    }
-    for (std::size_t i = 0; i < info.tissues.size(); ++i) {
-        Statement(database, "INSERT INTO tissues VALUES (?, ?)", static_cast<std::int64_t>(i), info.tissues[i]).run();
-    }
-}
-
-[[noreturn]] void refuse(const std::string& file, const std::string& why)
-{
-    throw base::error("{}: cannot be made: {}", file, why);
-}
-
-// Gives `part` the name `file`, never in another file's place.
-void giveName(const std::string& part, const std::string& file)
-{
-    int failed = ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, file.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
-    if (failed == EINVAL && !std::filesystem::exists(file)) {  // a file system that cannot refuse by itself
-        failed = std::rename(part.c_str(), file.c_str()) == 0 ? 0 : errno;
-    }
-    base::failIf(failed == EEXIST || failed == EINVAL, "{}: exists already; choose another name or remove it", file);
-    if (failed != 0) {
-        refuse(file, std::strerror(failed));
-    }
-}
-
-// Makes a record without ticks under another name first, so that the file is there whole or not at all.
-void makeFile(const std::string& file, const SessionInfo& info)
-{
-    base::failIf(std::filesystem::exists(file), "{}: exists already; choose another name or remove it", file);
-    const std::string part = file + "." + std::to_string(::getpid()) + ".part";
-    removeFile(part);
-    try {
-        Database database(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX);
-        database.execute("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN");
-        database.execute("PRAGMA application_id = " + std::to_string(format::applicationId));
-        database.execute("PRAGMA user_version = " + std::to_string(format::version));
-        for (const auto& [table, statement] : format::schema(info)) {
-            database.execute(statement);
-        }
-        writeInfo(database, info);
-        database.execute("COMMIT; PRAGMA journal_mode = WAL");
-    } catch (const std::exception& e) {
-        removeFile(part);
-        refuse(file, e.what());
-    }
-    try {
-        giveName(part, file);
-        removeLogs(file);  // of a record that was removed while it was written: they would be taken for this one's
-    } catch (const std::exception&) {
-        removeFile(part);
-        throw;
-    }
-}
-
-/// Which file a name is, so that it can be told whether the name still is that file's.
-struct FileId {
-    bool there = false;
-    dev_t device{};
-    ino_t inode{};
-
-    bool operator==(const FileId&) const = default;
-};
-
-FileId fileId(const std::filesystem::path& file) noexcept
-{
-    struct stat s {};
-    return ::stat(file.c_str(), &s) == 0 ? FileId{true, s.st_dev, s.st_ino} : FileId{};
-}
-
-// Binds fields one after another, in the order of format::eachColumn.
-struct Binder {
-    Statement& row;
-    int position = 0;
-
-    void operator()(const char*, const double& v) { row.bind(++position, v); }
-    template <class Integer>
-    void operator()(const char*, const Integer& v)
-    {
-        row.bind(++position, static_cast<std::int64_t>(v));
-    }
-    void operator()(const char*, const Phase& v) { row.bind(++position, phaseNames[static_cast<std::size_t>(v)]); }
-    void operator()(const char*, const WarningLevel& v) { row.bind(++position, warningNames[static_cast<std::size_t>(v)]); }
-    void operator()(const char*, const format::Microseconds<const float>& v)
-    {
-        row.bind(++position, static_cast<double>(v.value) * 1e6);
-    }
-    void operator()(const char*, const format::OptionalIndex<const std::uint8_t>& v)
-    {
-        if (v.value == format::none) {
-            row.bindNull(++position);
-        } else {
-            row.bind(++position, static_cast<std::int64_t>(v.value));
-        }
-    }
-};
-
-std::string tickInsert(const format::TickColumns& of)
-{
-    const std::string columns = format::columnList(of);
-    std::string places = "?";
-    for (auto n = std::ranges::count(columns, ','); n > 0; --n) {
-        places += ", ?";
-    }
-    return "INSERT INTO ticks (" + columns + ") VALUES (" + places + ")";
-}
-
-// The prepared statements of a session, and the digests of what they write.
-class Writer {
-public:
-    Writer(Database& database, const format::TickColumns& columns)
-        : database_(database),
-          columns_(columns),
-          tick_(database, tickInsert(columns)),
-          event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
-          core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
-          fraction_(database, "INSERT INTO core_fractions VALUES (?, ?, ?)")
-    {
-        event_.digestInto(&seal_.events);
-        core_.digestInto(&seal_.cores);
-        fraction_.digestInto(&seal_.fractions);
-    }
-
-    void write(const TickRecord& record)
-    {
-        tick_.digestInto(&seal_.ticks(record.tick));
-        format::eachColumn(record, columns_, Binder{tick_});
-        tick_.run();
-        for (std::uint32_t i = 0; i < std::min<std::size_t>(record.eventCount, maxEventsPerTick); ++i) {
-            const Event& event = record.events[i];
-            Binder bind{event_};
-            bind("tick", record.tick);
-            bind("position", i);
-            event_.bind(++bind.position, eventNames[static_cast<std::size_t>(event.kind)]);
-            bind("structure", format::OptionalIndex{event.structure});
-            bind("tissue", event.tissue);
-            bind("value", event.value);
-            event_.run();
-        }
-        if (record.fired) {
-            writeCore(record.tick, record.core);
-        }
-    }
-
-    /// Closes the record: what it holds now is what it held when it was written.
-    void seal()
-    {
-        std::vector<format::SealedPart> parts = format::sealOfSmallTables(database_);
-        std::ranges::move(seal_.parts(), std::back_inserter(parts));
-        parts.push_back(format::sealOf(parts));
-        database_.execute("DELETE FROM seal");
-        for (const format::SealedPart& part : parts) {
-            Statement(database_, "INSERT INTO seal VALUES (?, ?, ?)", part.part, part.rows, part.sha256).run();
-        }
-    }
-
-private:
-    void writeCore(std::uint64_t tick, const CoreSample& core)
-    {
-        Binder bind{core_};
-        bind("tick", tick);
-        for (const double value :
-             {core.volume, core.targetFraction, core.targetLength, core.notchStart.x, core.notchStart.y, core.notchStart.z,
-              core.notchEnd.x, core.notchEnd.y, core.notchEnd.z}) {
-            bind("", value);
-        }
-        bind("", core.fragments);
-        core_.run();
-        for (std::size_t i = 0; i < maxTissues; ++i) {
-            if (core.fraction[i] != 0) {
-                fraction_.bindAll(static_cast<std::int64_t>(tick), static_cast<std::int64_t>(i), core.fraction[i]);
-                fraction_.run();
-            }
-        }
-    }
-
-    Database& database_;
-    format::TickColumns columns_;
-    format::RunningSeal seal_;
-    Statement tick_, event_, core_, fraction_;
-};
 
 // The writer thread takes no signals; one about the size of files (RLIMIT_FSIZE) would end the process.
 class SignalsBlocked {
@@ -295,7 +84,9 @@ struct Recorder::Impl {
     std::string error;
     std::string unfolded;  // why the log of a whole record is still there; empty: it is not, or a reader keeps it
     std::thread thread;
-    bool closed = false;  // of that thread: all that was written is sealed
+    // Of that thread:
+    bool closed = false;                           // all that was written is sealed
+    std::optional<Clock::time_point> lockedSince;  // by another program
 
     // The ring holds eight seconds at the session's rate, and never less than eight at 1 kHz.
     Impl(const std::string& path, const SessionInfo& info)
@@ -315,6 +106,7 @@ struct Recorder::Impl {
             // left to the end: a sync may take a second on a busy disk.
             database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
             database->execute("UPDATE session SET value = value");
+            sqlite3_busy_timeout(database->get(), lockedWait);
             writer.emplace(*database, format::columnsOf(info));
             const SignalsBlocked inherited;
             thread = std::thread([this] { work(); });
@@ -333,9 +125,10 @@ struct Recorder::Impl {
             const std::uint64_t request = requests;
             const std::optional<Results> toFinish = std::exchange(results, std::nullopt);
             last = stopping;
+            const bool awaited = last || request > answered;
             const bool failed = !error.empty();
             lock.unlock();
-            std::string problem = failed ? drop() : store(toFinish, last);
+            std::string problem = failed ? drop() : store(toFinish, last, awaited);
             std::string apart = toFinish && closed ? fold() : std::string();
             lock.lock();
             if (!problem.empty()) {
@@ -356,8 +149,29 @@ struct Recorder::Impl {
         return {};
     }
 
+    // Begins to write. False while another program has the file locked: ticks then wait in the ring, until that is nearly
+    // full. Where somebody waits for the file, it is tried for ten seconds.
+    bool begin(bool awaited)
+    {
+        for (const auto first = Clock::now();;) {
+            const int kind = sqlite3_exec(database->get(), "BEGIN IMMEDIATE", nullptr, nullptr, nullptr) & 0xFF;
+            if (kind == SQLITE_OK) {
+                lockedSince.reset();
+                return true;
+            }
+            const auto now = Clock::now();
+            lockedSince = lockedSince.value_or(first);
+            const bool nearlyFull = ring.write_available() < (ring.write_available() + ring.read_available()) / 16;
+            const bool enough = awaited ? now - first > longestLock : nearlyFull && now - *lockedSince > shortLock;
+            base::failIf((kind != SQLITE_BUSY && kind != SQLITE_LOCKED) || enough, "{}", sqlite3_errmsg(database->get()));
+            if (!awaited) {
+                return false;
+            }
+        }
+    }
+
     // Returns what went wrong, or nothing.
-    std::string store(const std::optional<Results>& toFinish, bool last) noexcept
+    std::string store(const std::optional<Results>& toFinish, bool last, bool awaited) noexcept
     {
         std::size_t taken = 0;
         try {
@@ -367,7 +181,9 @@ struct Recorder::Impl {
                     break;
                 }
                 closed = false;
-                database->execute("BEGIN IMMEDIATE");
+                if (!begin(awaited)) {
+                    return {};
+                }
                 while (taken < ticksPerTransaction && ring.consume_one([&](const TickRecord& r) {
                     writer->write(r);
                     ++taken;
@@ -392,7 +208,8 @@ struct Recorder::Impl {
 
     void complete(const Results& values)
     {
-        database->execute("BEGIN IMMEDIATE; DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
+        begin(true);
+        database->execute("DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
         insertPair(*database, "session", "complete", std::int64_t{1});
         insertPair(*database, "session", "lost_ticks", static_cast<std::int64_t>(lost.load()));
         for (const auto& [key, value] : values) {
@@ -406,6 +223,7 @@ struct Recorder::Impl {
     // good: the reader leaves the file all that it needs. Returns what is to be done where there is no room for it.
     std::string fold() noexcept
     {
+        sqlite3_busy_timeout(database->get(), 2000);  // a reader may be at work just now
         int status = sqlite3_wal_checkpoint_v2(database->get(), nullptr, SQLITE_CHECKPOINT_PASSIVE, nullptr, nullptr);
         if (status == SQLITE_OK) {
             status = sqlite3_exec(database->get(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);

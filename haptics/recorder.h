@@ -51,11 +51,15 @@ struct Seal {
     std::vector<std::string> changed;  // what is not what was written, in words: "session.operator is gone"
 };
 
+/// Why no record can get this name, to be put behind "FILE: "; empty: it can. The name is also taken where the log of a
+/// record lies that was moved without it: most of an interrupted session is in its log.
+[[nodiscard]] std::string nameTaken(const std::filesystem::path& file);
+
 /// Writes a session to one SQLite file (WAL). The servo thread pushes, a thread of the recorder's own writes in batches, so
 /// that a kill at any moment loses at most 0.5 s.
 class Recorder {
 public:
-    /// Throws std::runtime_error when the file cannot be made or exists already, and for a session that no record holds:
+    /// Throws std::runtime_error when the file cannot be made or its name is taken, and for a session that no record holds:
     /// a rate outside 100 Hz to 20 kHz, more structures or tissues than there may be, names of over 200 bytes.
     Recorder(const std::filesystem::path& file, const SessionInfo& info);
     /// Writes what is left, marks the session complete and leaves one plain file, as finish() does.

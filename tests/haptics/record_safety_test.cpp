@@ -1,0 +1,118 @@
+#include <haptics/recorder.h>
+
+#include <tests/error_of.h>
+#include <tests/haptics/synthetic_session.h>
+#include <tests/sqlite_edit.h>
+
+#include <gtest/gtest.h>
+
+#include <sqlite3.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <thread>
+
+// What was recorded is not lost, whatever else is done to its files.
+
+namespace palpate::haptics {
+namespace {
+
+void expectRefusal(const std::filesystem::path& file, const std::string& words, const std::string& error)
+{
+    EXPECT_TRUE(error.starts_with(file.string() + ": ")) << error;
+    EXPECT_NE(error.find(words), std::string::npos) << error;
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+}
+
+// After a crash nearly all of a record is in its log. Whoever moves the record alone must not lose the log to the next one.
+TEST(RecordSafety, TheNameOfARecordThatLeftItsLogThereIsRefused)
+{
+    const synthetic::Folder folder;
+    const auto file = folder / "a.palpate";
+    for (const char* suffix : {"-wal", "-journal"}) {
+        const std::filesystem::path log = file.string() + suffix;
+        std::ofstream(log) << "nearly all";
+        expectRefusal(file, log.string() + " is there without it: it belongs to a record of that name that was moved",
+                      tests::errorOf([&] { Recorder(file, synthetic::info()); }));
+        EXPECT_FALSE(std::filesystem::exists(file));
+        EXPECT_EQ(std::filesystem::file_size(log), 10U);
+        std::ofstream(file) << "the rest";
+        expectRefusal(file, "exists already, and " + log.string() + " is part of it",
+                      tests::errorOf([&] { Recorder(file, synthetic::info()); }));
+        EXPECT_EQ(std::filesystem::file_size(log), 10U);
+        std::filesystem::remove(file);
+        std::filesystem::resize_file(log, 0);  // nothing is lost with it
+    }
+    synthetic::record(file, synthetic::info(), {TickRecord{}});
+    EXPECT_EQ(Record(file).ticks(), 1U);
+}
+
+/// Another program that has begun to write into a record.
+class Lock {
+public:
+    explicit Lock(const std::filesystem::path& file)
+    {
+        EXPECT_EQ(sqlite3_open(file.c_str(), &database_), SQLITE_OK);
+        EXPECT_EQ(sqlite3_exec(database_, "BEGIN IMMEDIATE", nullptr, nullptr, nullptr), SQLITE_OK);
+    }
+    ~Lock() { sqlite3_close(database_); }
+    Lock& operator=(Lock&&) = delete;
+
+private:
+    sqlite3* database_ = nullptr;
+};
+
+constexpr std::chrono::milliseconds longerThanOneTry{2300};
+
+// While a session runs, and when it ends.
+TEST(RecordSafety, TicksWaitForTheEndOfAnothersLock)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const auto file = folder / "a.palpate";
+    Recorder recorder(file, synthetic::info());
+    TickRecord tick;
+    const auto push = [&](std::uint64_t until) {
+        for (; tick.tick < until; ++tick.tick) {
+            recorder.push(tick);
+        }
+    };
+    push(500);
+    recorder.flush();
+    for (const bool ends : {false, true}) {
+        auto lock = std::make_optional<Lock>(file);
+        push(tick.tick + 2000);
+        std::thread other([&] {
+            std::this_thread::sleep_for(longerThanOneTry);
+            lock.reset();
+        });
+        if (ends) {
+            recorder.finish({});
+        }
+        other.join();
+    }
+    EXPECT_EQ(recorder.error(), "");
+    EXPECT_TRUE(recorder.whole());
+    EXPECT_EQ(Record(file).ticks(), 4500U);
+    EXPECT_EQ(Record(file).seal().state, Seal::State::whole);
+}
+
+// The session goes on without a record, and says so.
+TEST(RecordSafety, ALockThatOutlastsTheRingEndsTheRecord)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const auto file = folder / "a.palpate";
+    Recorder recorder(file, synthetic::info());
+    const Lock lock(file);
+    for (TickRecord tick; tick.tick < 8000; ++tick.tick) {
+        recorder.push(tick);
+    }
+    std::this_thread::sleep_for(longerThanOneTry);
+    recorder.finish({});
+    expectRefusal(file, "recording stopped: database is locked", recorder.error());
+    EXPECT_FALSE(recorder.whole());
+}
+
+}  // namespace
+}  // namespace palpate::haptics
