@@ -4,6 +4,7 @@
 #include <planner/figures.h>
 #include <planner/planner.h>
 
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
@@ -17,8 +18,9 @@ py::object plan(const py::object& what, double error, const std::optional<double
 {
     refuseIf(!(error > 0 && error <= 1) || (forceError && !(*forceError > 0 && *forceError <= 1)),
              "error, force_error: have to be above 0, and 1 at most: 0.03 is 3 %");
-    refuseIf(!(budget > 0 && budget <= 1 && speed > 0 && speed <= 1),
-             "budget, speed: have to be above 0, and 1 s and 1 m/s at most");
+    refuseIf(!(budget > 0 && budget <= 1), "budget: has to be above 0, and 1 s at most");
+    refuseIf(!(speed >= planner::minPlanSpeed && speed <= planner::maxPlanSpeed), "speed: has to be ",
+             fmt::format("{:g} to {:g} m/s", planner::minPlanSpeed, planner::maxPlanSpeed));
     SceneBox box = sceneOf(what);
     const std::string name = box.scene.name;
     planner::PlanRequest request;

@@ -165,7 +165,7 @@ class Plans(InFolder):
         self.assertLessEqual(ours["predicted_error_pct"], 25)
         self.assertLessEqual(ours["predicted_us"], 1000)
         self.assertGreater(len(ours["candidates"]), 3)
-        for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}):
+        for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}, {"speed": 1e-9}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 palpate.plan(scene, **wrong)
         with self.assertRaisesRegex(palpate.Error, "^budget: 1 us: "):
