@@ -31,16 +31,14 @@ py::object plan(const py::object& what, double error, const std::optional<double
     if (costs) {
         request.costs = planner::loadCosts(*costs);
     }
-    nlohmann::json figures;
-    {
+    return toPython(asOfScene([&] {
         const Unlocked others;
         box.scene.model.level = datasets::ModelLevel::spring;  // the bodies are made by the planner, one per spacing
-        auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
+        auto tissue = volumeOf(box);
         const auto model = haptics::buildModel(std::move(box.scene), std::move(tissue));
         const auto found = planner::planModel(model, request, [](const std::string&) {});
-        figures = planner::planFigures(name, found, request, costs ? costs->string() : "");
-    }
-    return toPython(figures);
+        return planner::planFigures(name, found, request, costs ? costs->string() : "");
+    }));
 }
 
 }  // namespace

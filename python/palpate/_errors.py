@@ -4,6 +4,7 @@ import re
 
 _PLACE = re.compile(r"^(?P<file>.+?):(?P<line>\d+): (?P<rest>.*)$", re.S)
 _KEY = re.compile(r"^(?:\[+(?P<section>[^\]]+)\]+ )?(?:(?P<who>'[^']*':) )?(?P<key>[A-Za-z_][\w.]*)(?: =|:)")
+_SECTION = re.compile(r"^\[+(?P<section>[^\]]+)\]+:")
 _QUOTED = re.compile(r"key '(?P<key>[^']+)'")
 
 
@@ -68,6 +69,13 @@ class SceneError(Error, ValueError):
         return type(self), (str(self), self.file, self.line, self.key)
 
 
+def model_error(message: str) -> Error:
+    """What is said while a scene's volume or model is made: a SceneError where it says a place or a section of the scene."""
+    if _PLACE.match(message) or message.startswith("["):
+        return scene_error(message)
+    return Error(in_python(message))
+
+
 def scene_error(message: str) -> SceneError:
     """The SceneError of a message "FILE:LINE: [section] key = value: what is wrong"."""
     message = in_python(message)
@@ -79,4 +87,6 @@ def scene_error(message: str) -> SceneError:
         name = quoted["key"]
     elif key:
         name = ".".join(filter(None, (key["section"], key["key"])))
+    elif section := _SECTION.match(rest):
+        name = section["section"]
     return SceneError(message, place["file"] if place else None, int(place["line"]) if place else None, name)
