@@ -34,8 +34,13 @@ _OF_IMPORT = re.compile(r"(?<!palpate import )--(volume|image-volume|series|axes
                         r"threshold|slice-spacing|names|crop)\b")
 
 
+# The file that scenes of a volume in memory name, which is not there.
+_IN_MEMORY = re.compile(r"^(?:.*/)?volume-in-memory\.vdb:(?:\d+:)? ")
+
+
 def in_python(message: str) -> str:
-    """What a program says, with the arguments of Python for its options."""
+    """What a program says, with the arguments of Python for its options, and without a file that is none."""
+    message = _IN_MEMORY.sub("", message)
     if "--" not in message:
         return message
     for pattern, ours in _IN_PYTHON:

@@ -81,6 +81,24 @@ class Sweeps(InFolder):
         with self.assertRaisesRegex(palpate.Error, "no cases"):
             sweep(self.folder / "u", [])
 
+    def test_arguments_that_are_none_are_said_by_name(self):
+        for wrong, keys in (("sweep: procedure: give one of .*press", {"procedure": None}), ("has no argument 'output'", {"output": "force_n"}),
+                            ("has no argument 'repeat'.* repeats", {"repeat": 2})):
+            with self.subTest(wrong), self.assertRaisesRegex(TypeError, wrong):
+                palpate.sweep("block", [{"tissue.fat.youngs_kpa": 4.0}], **keys)
+
+    def test_a_wrong_plan_names_no_file_that_is_gone(self):
+        for keys in ({"outputs": ["nothing"]}, {"procedure": {"kind": "press", "deep_mm": 3}}, {"procedure": "none"}, {"repeats": 0},
+                     {"reference": {"tissue.nope.youngs_kpa": 1}}):
+            with self.subTest(keys), self.assertRaises(palpate.Error) as caught:
+                palpate.sweep("block", [{"tissue.fat.youngs_kpa": 4.0}], **keys)
+            self.assertNotRegex(str(caught.exception), r"\.toml|\n|/")
+
+    def test_one_output_is_a_word(self):
+        from palpate._sweep import plan_of
+        cases = [{"tissue.fat.youngs_kpa": 4.0}]
+        self.assertEqual(plan_of("block", cases, outputs="force_n"), plan_of("block", cases, outputs=["force_n"]))
+
     def test_a_number_of_processes_that_is_none_is_refused_before_anything_begins(self):
         for wrong in (2.5, "2"):
             with self.subTest(wrong), self.assertRaisesRegex(TypeError, "jobs: give a whole number"):
