@@ -13,6 +13,18 @@ namespace palpate::python {
 
 namespace {
 
+// Between two models that are tried: Ctrl-C ends the plan.
+void heedSignals(const std::string&)
+{
+    if (ending()) {
+        return;  // the interpreter waits
+    }
+    const py::gil_scoped_acquire mine;
+    if (PyErr_CheckSignals() != 0) {
+        throw py::error_already_set();
+    }
+}
+
 py::object plan(const py::object& what, double error, const std::optional<double>& forceError, double budget, double speed,
                 const std::optional<std::filesystem::path>& costs)
 {
@@ -36,7 +48,7 @@ py::object plan(const py::object& what, double error, const std::optional<double
         box.scene.model.level = datasets::ModelLevel::spring;  // the bodies are made by the planner, one per spacing
         auto tissue = volumeOf(box);
         const auto model = haptics::buildModel(std::move(box.scene), std::move(tissue));
-        const auto found = planner::planModel(model, request, [](const std::string&) {});
+        const auto found = planner::planModel(model, request, &heedSignals);
         return planner::planFigures(name, found, request, costs ? costs->string() : "");
     }));
 }

@@ -172,6 +172,18 @@ print(len(sweep({str(self.folder / "s")!r}, [{{"tissue.fat.youngs_kpa": 4.0}}]))
 
 
 class Plans(InFolder):
+    def test_ctrl_c_ends_a_plan(self):
+        code = """
+import signal, sys, threading, palpate
+threading.Timer(1, signal.raise_signal, [signal.SIGINT]).start()
+try:
+    palpate.plan("block", error=0.001)
+except KeyboardInterrupt:
+    sys.exit(7)
+"""
+        done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, timeout=300)
+        self.assertEqual((done.returncode, done.stderr), (7, ""))
+
     def test_a_plan_is_that_of_the_program(self):
         smaller = {"width_mm": 27, "thickness_mm": 18, "tumour_centre_mm": 9, "tumour_diameter_mm": 6}
         keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {
