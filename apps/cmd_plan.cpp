@@ -176,7 +176,8 @@ void addPlan(CLI::App& app)
     command->add_option("--force-error", o->forceError,
                         "Maximum error of the force, e.g. 5% or 0.05: only level elastic can hold it (default: no limit)");
     command->add_option("--budget", o->budget, "Maximum time per tick, e.g. 400us or 0.4ms")->capture_default_str();
-    command::addNumber(*command, "--speed", o->speed, "Speed of the test push [mm/s]", 1.0, 1000.0);
+    command::addNumber(*command, "--speed", o->speed, "Speed of the test push [mm/s]", 1e3 * planner::minPlanSpeed,
+                       1e3 * planner::maxPlanSpeed);
     command->add_flag("--all", o->all, "Try every model within the budget, to see how much a better one costs");
     command
         ->add_option("--costs", o->costs,

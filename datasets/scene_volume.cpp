@@ -122,6 +122,8 @@ std::string largestStructure(const Tissue& tissue)
 Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, const std::string& target)
 {
     const std::string aim = target.empty() ? lesionOf(tissue) : target;
+    base::failIf(aim.empty() && solidNames(tissue).empty(), "{}: has no labels of tissue: there is nothing to aim at",
+                 file.native());
     base::failIf(aim.empty(), "{}: no tumour or lesion to aim at: choose with --target NAME, one of {}", file.native(),
                  fmt::join(solidNames(tissue), ", "));
     Scene scene;

@@ -116,12 +116,12 @@ std::string Section::where(const toml::node& node, std::string_view key) const
 std::string Section::place(std::string_view key) const
 {
     const toml::node* node = table_->get(key);
-    return node == nullptr ? place() : fmt::format("{}:{}", file_, node->source().begin.line);
+    return node == nullptr || file_.empty() ? place() : fmt::format("{}:{}", file_, node->source().begin.line);
 }
 
 std::string Section::place() const
 {
-    return fmt::format("{}:{}", file_, table_->source().begin.line);
+    return file_.empty() ? "" : fmt::format("{}:{}", file_, table_->source().begin.line);
 }
 
 void Section::refuse(std::string_view key, std::string_view what, std::string_view unit) const

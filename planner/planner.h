@@ -63,6 +63,9 @@ struct PlanCosts {
     LawCosts of(const volume::Law& law) const noexcept;
 };
 
+/// Speeds of a test push [m/s]: a slower one takes memory and time for ticks in which nothing happens.
+inline constexpr double minPlanSpeed = 1e-3, maxPlanSpeed = 1.0;
+
 struct PlanRequest {
     double error = 0.03;               // of the shape near the tool, share that may not be passed: see PlanCandidate::error
     std::optional<double> forceError;  // of the force: only level `elastic` can hold it; nothing: any

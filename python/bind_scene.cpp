@@ -291,18 +291,25 @@ SceneBox sceneOf(const py::object& what)
     return sceneNamed(textOfPath(what));
 }
 
+std::shared_ptr<const volume::Tissue> volumeOf(const SceneBox& box)
+{
+    return box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
+}
+
 std::shared_ptr<const Modelled> modelOf(const py::object& what)
 {
     if (py::isinstance<Modelled>(what)) {
         return what.cast<std::shared_ptr<Modelled>>();
     }
     SceneBox box = sceneOf(what);
-    const Unlocked others;
-    auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
-    auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), tissue), box.origin);
-    made->given = std::move(tissue);
-    made->inMemory = box.inMemory;
-    return made;
+    return asOfScene([&] {
+        const Unlocked others;
+        auto tissue = volumeOf(box);
+        auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), tissue), box.origin);
+        made->given = std::move(tissue);
+        made->inMemory = box.inMemory;
+        return made;
+    });
 }
 
 void bindScene(py::module_& module)

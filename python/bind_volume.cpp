@@ -8,6 +8,7 @@
 #include <volume/image_check.h>
 #include <volume/prepare/volume_import.h>
 
+#include <fmt/format.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 #include <tbb/parallel_for.h>
@@ -117,6 +118,20 @@ py::array_t<double> matrixOf(const volume::Affine& affine)
     return out;
 }
 
+// The name of a structure, as files and messages can have it: on one line.
+void checkName(const volume::LabelName& label)
+{
+    const std::string where = fmt::format("tissues: label {}", label.value);
+    refuseIf(label.name.find_first_not_of(' ') == std::string::npos, where, ": its name is empty");
+    for (std::size_t at = 0; at < label.name.size(); ++at) {
+        const auto byte = [&](std::size_t i) {
+            return i < label.name.size() ? static_cast<unsigned char>(label.name[i]) : 0;
+        };
+        const bool second = byte(at) == 0xc2 && byte(at + 1) < 0xa0;  // U+0080 to U+009F in UTF-8
+        refuseIf(byte(at) < 0x20 || byte(at) == 0x7f || second, where, ": its name holds a control character");
+    }
+}
+
 // {value: "tissue"} or {value: ("name", "tissue")}.
 std::vector<volume::LabelName> namesOf(const py::dict& tissues)
 {
@@ -138,6 +153,13 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
                                       ": give a tissue or (structure's name, tissue), not " +
                                       py::repr(said).cast<std::string>());
             }
+        }
+        checkName(name);
+        // Labels that are called by their tissue may share that.
+        const auto same = std::ranges::find(names, name.name, &volume::LabelName::name);
+        if (same != names.end() && (same->tissue != name.name || name.tissue != name.name)) {
+            throw py::value_error(fmt::format("tissues: labels {} and {} are both called '{}': give each its own name",
+                                              same->value, name.value, name.name));
         }
         names.push_back(std::move(name));
     }

@@ -153,11 +153,22 @@ void setError(const std::string& message)
     PyErr_SetObject(errors.attr("Error").ptr(), py::object(errors.attr("in_python")(textOf(message))).ptr());
 }
 
-void throwSceneError(const std::string& message)
+// Throws what a function of palpate._errors makes of the message.
+[[noreturn]] static void throwMadeBy(const char* function, const std::string& message)
 {
-    py::object error = py::module_::import("palpate._errors").attr("scene_error")(textOf(message));
+    py::object error = py::module_::import("palpate._errors").attr(function)(textOf(message));
     PyErr_SetObject(py::type::of(error).ptr(), error.ptr());
     throw py::error_already_set();
+}
+
+void throwSceneError(const std::string& message)
+{
+    throwMadeBy("scene_error", message);
+}
+
+void throwModelError(const std::string& message)
+{
+    throwMadeBy("model_error", message);
 }
 
 }  // namespace palpate::python

@@ -66,6 +66,9 @@ void setError(const std::string& message);
 /// Takes apart "FILE:LINE: [section] key = value: what is wrong" and throws palpate.SceneError, a ValueError with the
 /// attributes file, line, key.
 [[noreturn]] void throwSceneError(const std::string& message);
+/// What a scene's volume or model says while it is made: palpate.SceneError where a place or a key of the scene is at
+/// fault, palpate.Error otherwise.
+[[noreturn]] void throwModelError(const std::string& message);
 
 void bindVolume(py::module_& module);
 void bindScene(py::module_& module);

@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,20 @@ struct SceneBox {
 SceneBox sceneNamed(const std::string& what);
 /// The scene that an argument of Python means: a Scene, a name or a path.
 SceneBox sceneOf(const py::object& what);
+/// Its volume, made where it is not loaded. Needs no GIL.
+std::shared_ptr<const volume::Tissue> volumeOf(const SceneBox& box);
+/// `work()`, which makes a volume or a model; its errors are throwModelError's.
+template <class Work>
+auto asOfScene(const Work& work)
+{
+    try {
+        return work();
+    } catch (const py::builtin_exception&) {
+        throw;
+    } catch (const std::runtime_error& e) {
+        throwModelError(e.what());
+    }
+}
 /// The model that it means: a Model, or one that is built now, with the GIL released.
 std::shared_ptr<const Modelled> modelOf(const py::object& what);
 /// [(key, value)] of nested dictionaries, keys joined by dots.

@@ -1,5 +1,6 @@
 #include <python/unlocked.h>
 
+#include <dlfcn.h>
 #include <pthread.h>
 #include <unistd.h>
 
@@ -29,6 +30,15 @@ void waitForThreads()
             isAbandoned = true;
             throw pybind11::error_already_set();
         }
+    }
+}
+
+// OpenVDB brings log4cplus, which starts threads when it is loaded. Its destructor waits for them, in a forked process for
+// ever. OpenVDB does not use them. Its headers are not installed, and other builds of OpenVDB are without it.
+void stopLogThreads()
+{
+    if (void* const stop = dlsym(RTLD_DEFAULT, "_ZN9log4cplus18shutdownThreadPoolEv")) {
+        reinterpret_cast<void (*)()>(stop)();
     }
 }
 
@@ -65,6 +75,7 @@ void throwEnding()
 
 void waitAtExit()
 {
+    stopLogThreads();
     // A forked process has none of the other threads.
     pthread_atfork(nullptr, nullptr, [] { unlockedThreads = 0; });
     pybind11::module_::import("atexit").attr("register")(pybind11::cpp_function(&waitForThreads));

@@ -24,7 +24,8 @@ bool ending() noexcept;
 /// Throws SystemExit.
 [[noreturn]] void throwEnding();
 
-/// Has the interpreter wait for all Unlocked of other threads when it ends, until Ctrl-C.
+/// Has the interpreter wait for all Unlocked of other threads when it ends, until Ctrl-C; and a forked process ends
+/// although it has none of the threads of libraries.
 void waitAtExit();
 
 }  // namespace palpate::python

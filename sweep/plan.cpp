@@ -212,14 +212,30 @@ ProcedureKind kindOf(const std::vector<Setting>& settings, Section& top)
     return ProcedureKind::session;
 }
 
+// With a reference, each output of the procedure has two more columns. They follow those that the plan lists.
+void addComparisons(ProcedureKind kind, SweepPlan& plan)
+{
+    const std::vector<SweepOutput> listed = plan.reference.empty() ? std::vector<SweepOutput>() : plan.outputs;
+    const auto infos = outputsOf(kind);
+    for (const SweepOutput& output : listed) {
+        const auto info = std::ranges::find(infos, output.name, &OutputInfo::name);
+        if (info == infos.end() || !output.formula.empty()) {
+            continue;
+        }
+        for (const std::string& name : namesOf(*info, true)) {
+            if (std::ranges::find(listed, name, &SweepOutput::name) == listed.end()) {
+                plan.outputs.push_back({name, {}});
+            }
+        }
+    }
+}
+
 void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
 {
     std::set<std::string> there;
     for (const OutputInfo& o : outputsOf(kind)) {
-        there.insert(o.name);
-        if (!plan.reference.empty()) {
-            there.insert("reference_" + o.name);
-            there.insert(o.name + "_change_pct");
+        for (std::string& name : namesOf(o, !plan.reference.empty())) {
+            there.insert(std::move(name));
         }
     }
     auto words = top.words("outputs");
@@ -241,6 +257,7 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
                      fmt::format("'{}': a name must be letters, digits and _, and begin with a letter", output.name));
         plan.outputs.push_back(std::move(output));
     }
+    addComparisons(kind, plan);
 }
 
 void checkCases(double points, const SweepPlan& plan, Section& top)

@@ -87,14 +87,13 @@ void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::Ti
     datasets::withChanges(at->second, scene.tissueChanges);
 }
 
-// What formulas call an output, and what a reference case adds.
+}  // namespace
+
 std::vector<std::string> namesOf(const OutputInfo& output, bool compared)
 {
     return compared ? std::vector<std::string>{output.name, "reference_" + output.name, output.name + "_change_pct"}
                     : std::vector<std::string>{output.name};
 }
-
-}  // namespace
 
 void checkColumns(Section& top, const SweepPlan& plan)
 {

@@ -6,6 +6,7 @@
 #include <haptics/replay.h>
 #include <session/open.h>
 #include <sweep/formula.h>
+#include <sweep/plan_checks.h>
 #include <sweep/procedure.h>
 
 #include <fmt/format.h>
@@ -120,8 +121,9 @@ CaseRow CaseRunner::run(std::size_t index, const std::filesystem::path& record)
         numbers[infos[i].name] = own.values[i];
         if (reference != nullptr) {
             const double before = reference->values[i];
-            numbers["reference_" + infos[i].name] = before;
-            numbers[infos[i].name + "_change_pct"] = 100.0 * (own.values[i] - before) / std::abs(before);
+            const auto names = namesOf(infos[i], true);
+            numbers[names[1]] = before;
+            numbers[names[2]] = 100.0 * (own.values[i] - before) / std::abs(before);
         }
     }
     CaseRow row;

@@ -5,6 +5,7 @@
 #include <base/split.h>
 #include <datasets/scene_text.h>
 #include <haptics/record_format.h>
+#include <sweep/plan_checks.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -13,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <system_error>
 
 namespace palpate::sweep {
@@ -49,9 +51,15 @@ std::vector<SweepTable::Column> columnsOf(const SweepPlan& plan)
         out.push_back({a.name, "parameter", a.key.empty() ? "for formulas of the plan" : "key " + a.key});
     }
     const auto infos = outputsOf(sweepCase(plan, 0).procedure.kind);
+    std::map<std::string, std::string> meanings;
+    for (const OutputInfo& info : infos) {
+        const auto names = namesOf(info, true);
+        meanings[names[0]] = info.meaning;
+        meanings[names[1]] = info.name + " of the reference case";
+        meanings[names[2]] = "by how much " + info.name + " exceeds that of the reference case [%]";
+    }
     for (const auto& o : plan.outputs) {
-        const auto info = std::ranges::find(infos, o.name, &OutputInfo::name);
-        out.push_back({o.name, "output", !o.formula.empty() ? "=" + o.formula : info != infos.end() ? info->meaning : ""});
+        out.push_back({o.name, "output", !o.formula.empty() ? "=" + o.formula : meanings[o.name]});
     }
     out.insert(out.end(), {{"error", "case", "empty: the case was done"},
                            {"build", "provenance", "program that ran the case"},

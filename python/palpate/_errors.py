@@ -4,6 +4,7 @@ import re
 
 _PLACE = re.compile(r"^(?P<file>.+?):(?P<line>\d+): (?P<rest>.*)$", re.S)
 _KEY = re.compile(r"^(?:\[+(?P<section>[^\]]+)\]+ )?(?:(?P<who>'[^']*':) )?(?P<key>[A-Za-z_][\w.]*)(?: =|:)")
+_SECTION = re.compile(r"^\[+(?P<section>[^\]]+)\]+:")
 _QUOTED = re.compile(r"key '(?P<key>[^']+)'")
 
 
@@ -33,8 +34,13 @@ _OF_IMPORT = re.compile(r"(?<!palpate import )--(volume|image-volume|series|axes
                         r"threshold|slice-spacing|names|crop)\b")
 
 
+# The file that scenes of a volume in memory name, which is not there.
+_IN_MEMORY = re.compile(r"^(?:.*/)?volume-in-memory\.vdb:(?:\d+:)? ")
+
+
 def in_python(message: str) -> str:
-    """What a program says, with the arguments of Python for its options."""
+    """What a program says, with the arguments of Python for its options, and without a file that is none."""
+    message = _IN_MEMORY.sub("", message)
     if "--" not in message:
         return message
     for pattern, ours in _IN_PYTHON:
@@ -68,6 +74,13 @@ class SceneError(Error, ValueError):
         return type(self), (str(self), self.file, self.line, self.key)
 
 
+def model_error(message: str) -> Error:
+    """What is said while a scene's volume or model is made: a SceneError where it says a place or a section of the scene."""
+    if _PLACE.match(message) or message.startswith("["):
+        return scene_error(message)
+    return Error(in_python(message))
+
+
 def scene_error(message: str) -> SceneError:
     """The SceneError of a message "FILE:LINE: [section] key = value: what is wrong"."""
     message = in_python(message)
@@ -79,4 +92,6 @@ def scene_error(message: str) -> SceneError:
         name = quoted["key"]
     elif key:
         name = ".".join(filter(None, (key["section"], key["key"])))
+    elif section := _SECTION.match(rest):
+        name = section["section"]
     return SceneError(message, place["file"] if place else None, int(place["line"]) if place else None, name)

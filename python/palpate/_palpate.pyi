@@ -431,7 +431,7 @@ def plan(
 
     Args:
         force_error: of the force, too (share); only level "elastic" can hold it.
-        speed: of the test push [m/s].
+        speed: of the test push, 0.001 to 1 [m/s].
         costs: what `palpate bench costs --json` wrote on the machine that is to run the model; None: the built-in costs of one
             server core.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -56,6 +58,7 @@ def press_path(
     if not (speed > 0 and depth >= 0 and hold >= 0 and lead >= 0):
         raise ValueError("press_path: speed has to be above 0, and depth, hold and lead not below 0")
     step = speed * TICK_SECONDS
-    down = np.append(np.arange(-lead, depth, step), depth)
+    steps = math.ceil((depth + lead) / step - 1e-6)  # the last one may be shorter; 1e-6: rounding makes none of its own
+    down = np.append(-lead + step * np.arange(steps), depth)
     way = np.concatenate([np.full(600, -lead), down, np.full(round(hold / TICK_SECONDS), depth), down[::-1]])
     return start + way[:, None] * (direction / length)

@@ -2,6 +2,7 @@
 
 import collections.abc
 import csv
+import inspect
 import json
 import operator
 import os
@@ -51,10 +52,12 @@ def plan_of(scene, cases, *, procedure="press", outputs=None, repeats=1, seed=1,
     Args: as of sweep().
     """
     rows = _rows(cases)
+    if not isinstance(procedure, (str, collections.abc.Mapping)):
+        raise TypeError(f"sweep: procedure: give one of {', '.join(sweep_outputs())}, or a dictionary with its keys, not {procedure!r}")
     procedure = {"kind": procedure} if isinstance(procedure, str) else dict(procedure)
     plan = {"scene": os.fspath(scene), "seed": seed, "repeats": repeats, "records": records}
     if outputs is not None:
-        plan["outputs"] = list(outputs)
+        plan["outputs"] = [outputs] if isinstance(outputs, str) else list(outputs)
     plan["design"] = {"kind": "list"}
     plan["procedure"] = procedure
     if set:
@@ -63,6 +66,16 @@ def plan_of(scene, cases, *, procedure="press", outputs=None, repeats=1, seed=1,
         plan["reference"] = dict(reference)
     plan["axis"] = [{"key": key, "values": [row[key] for row in rows]} for key in rows[0]]
     return dumps(plan)
+
+
+_OPTIONS = [name for name, one in inspect.signature(plan_of).parameters.items() if one.kind is one.KEYWORD_ONLY]
+
+
+def _without_file(message, written):
+    """A message without the file of a plan that was written for it and is gone, and the line there."""
+    if written is None:
+        return message
+    return re.sub(re.escape(written) + r":(\d+:)? ", "", message).replace(written, "plan")
 
 
 class SweepResult:
@@ -197,6 +210,9 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, any_build=Fa
     """
     _need_sweeps()
     jobs = _jobs(jobs)
+    for name in options:
+        if name not in _OPTIONS:
+            raise TypeError(f"sweep() has no argument {name!r}; with cases it has {', '.join(_OPTIONS)} too")
     folder = pathlib.Path(tempfile.mkdtemp(prefix="palpate-sweep-") if folder is None else folder)
     given = os.fspath(plan)
     written = None
@@ -216,6 +232,8 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, any_build=Fa
         raise TypeError(f"sweep() takes {', '.join(options)} only with cases")
     try:
         _work(folder, given, progress, jobs=jobs, retry=bool(retry), any_build=bool(any_build))
+    except Error as error:
+        raise Error(_without_file(str(error), written)) from None
     finally:
         if written is not None:
             os.unlink(written)

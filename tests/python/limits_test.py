@@ -164,6 +164,30 @@ class Forks(InFolder):
         np.testing.assert_array_equal(gone_on, expected[800:])
         self.assertEqual(session.ticks, 800)
 
+    def test_a_forked_process_may_end_as_programs_do(self):
+        # Threads of libraries that the child has not were waited for, for ever.
+        text = '''
+import os, sys
+import palpate
+if len(sys.argv) > 1:
+    model = palpate.Model(palpate.Scene("block").changed({"volume.voxel_mm": 3, "model.setting": "fast"}))
+if os.fork() == 0:
+    print("child")
+    sys.exit(3)
+sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))
+'''
+        for arguments in ([], ["model"]):
+            with self.subTest(arguments):
+                process = subprocess.Popen([sys.executable, "-B", "-c", text, *arguments], stdout=subprocess.PIPE, text=True,
+                                           start_new_session=True)
+                try:
+                    said, _ = process.communicate(timeout=60)
+                except subprocess.TimeoutExpired:
+                    os.killpg(process.pid, signal.SIGKILL)  # the child too
+                    process.communicate()
+                    raise
+                self.assertEqual((process.returncode, said), (3, "child\n"))
+
     def test_a_record_is_its_own_process_s_alone(self):
         file = self.folder / "r.db"
         session = palpate.Session(small_block(), record=file)

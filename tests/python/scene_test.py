@@ -63,6 +63,17 @@ class Scenes(InFolder):
         with self.assertRaisesRegex(palpate.SceneError, "TOML"):
             palpate.Scene.parse("name = ")
 
+    def test_a_tissue_that_the_volume_has_not_is_an_error_of_its_key(self):
+        for call in (palpate.Model, palpate.Session, palpate.plan):
+            for key, value, name in (("tissue.nope.youngs_kpa", 1, "tissue.nope"), ("tissue.fat.puncture_n", 0, "tissue.fat.cutting_n")):
+                scene = palpate.Scene("block").changed({"volume.voxel_mm": 4, "model.level": "spring", key: value})
+                with self.subTest(call, key=key), self.assertRaisesRegex(palpate.SceneError, r"^\[tissue\.") as caught:
+                    call(scene)
+                self.assertEqual((caught.exception.file, caught.exception.line, caught.exception.key), (None, None, name))
+        with self.assertRaises(palpate.SceneError) as caught:
+            palpate.Model(palpate.Scene.parse(palpate.Scene("block").text + "[tissue.nope]\nyoungs_kpa = 1\n", origin="mine"))
+        self.assertEqual((caught.exception.file, caught.exception.key), ("mine", "tissue.nope"))
+
     def test_names_that_are_no_text_are_value_errors(self):
         for wrong in ("block\udc80", "block\0x"):
             with self.subTest(wrong):

@@ -78,6 +78,18 @@ class Run(InFolder):
         for length in 1e200, 1e-200:
             np.testing.assert_array_equal(palpate.press_path([0, 0, 0], [0, length, 0], 1e-3), plain)
 
+    def test_a_path_down_has_whole_steps_and_its_lowest_point_once(self):
+        # Of these depths some are so many steps but for rounding, whose last point was there twice.
+        for depth in np.arange(100) * 1e-4:
+            for speed, lead in (0.02, 1e-3), (0.1, 0.0), (0.03, 0.5e-3):
+                with self.subTest(depth=depth, speed=speed):
+                    y = palpate.press_path([0, 0, 0], [0, 1, 0], depth, speed=speed, lead=lead, hold=0)[600:, 1]
+                    down = y[:len(y) // 2]
+                    steps = np.diff(down) / (1e-3 * speed)
+                    self.assertEqual((down[-1], down[::-1].tolist()), (depth, y[len(y) // 2:].tolist()))
+                    np.testing.assert_allclose(steps[:-1], 1, rtol=1e-9)
+                    self.assertTrue(np.all((steps > 1e-4) & (steps < 1 + 1e-5)), steps)
+
     def test_a_path_of_what_is_no_number_is_refused(self):
         for wrong in np.nan, np.inf, -np.inf:
             for arguments in [((wrong, 0, 0), (0, 1, 0), 1e-3), ((0, 0, 0), (0, wrong, 0), 1e-3), ((0, 0, 0), (0, 1, 0), wrong)]:

@@ -81,6 +81,24 @@ class Sweeps(InFolder):
         with self.assertRaisesRegex(palpate.Error, "no cases"):
             sweep(self.folder / "u", [])
 
+    def test_arguments_that_are_none_are_said_by_name(self):
+        for wrong, keys in (("sweep: procedure: give one of .*press", {"procedure": None}), ("has no argument 'output'", {"output": "force_n"}),
+                            ("has no argument 'repeat'.* repeats", {"repeat": 2})):
+            with self.subTest(wrong), self.assertRaisesRegex(TypeError, wrong):
+                palpate.sweep("block", [{"tissue.fat.youngs_kpa": 4.0}], **keys)
+
+    def test_a_wrong_plan_names_no_file_that_is_gone(self):
+        for keys in ({"outputs": ["nothing"]}, {"procedure": {"kind": "press", "deep_mm": 3}}, {"procedure": "none"}, {"repeats": 0},
+                     {"reference": {"tissue.nope.youngs_kpa": 1}}):
+            with self.subTest(keys), self.assertRaises(palpate.Error) as caught:
+                palpate.sweep("block", [{"tissue.fat.youngs_kpa": 4.0}], **keys)
+            self.assertNotRegex(str(caught.exception), r"\.toml|\n|/")
+
+    def test_one_output_is_a_word(self):
+        from palpate._sweep import plan_of
+        cases = [{"tissue.fat.youngs_kpa": 4.0}]
+        self.assertEqual(plan_of("block", cases, outputs="force_n"), plan_of("block", cases, outputs=["force_n"]))
+
     def test_a_number_of_processes_that_is_none_is_refused_before_anything_begins(self):
         for wrong in (2.5, "2"):
             with self.subTest(wrong), self.assertRaisesRegex(TypeError, "jobs: give a whole number"):
@@ -154,6 +172,18 @@ print(len(sweep({str(self.folder / "s")!r}, [{{"tissue.fat.youngs_kpa": 4.0}}]))
 
 
 class Plans(InFolder):
+    def test_ctrl_c_ends_a_plan(self):
+        code = """
+import signal, sys, threading, palpate
+threading.Timer(1, signal.raise_signal, [signal.SIGINT]).start()
+try:
+    palpate.plan("block", error=0.001)
+except KeyboardInterrupt:
+    sys.exit(7)
+"""
+        done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True, timeout=300)
+        self.assertEqual((done.returncode, done.stderr), (7, ""))
+
     def test_a_plan_is_that_of_the_program(self):
         smaller = {"width_mm": 27, "thickness_mm": 18, "tumour_centre_mm": 9, "tumour_diameter_mm": 6}
         keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {
@@ -165,7 +195,7 @@ class Plans(InFolder):
         self.assertLessEqual(ours["predicted_error_pct"], 25)
         self.assertLessEqual(ours["predicted_us"], 1000)
         self.assertGreater(len(ours["candidates"]), 3)
-        for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}):
+        for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}, {"speed": 1e-9}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 palpate.plan(scene, **wrong)
         with self.assertRaisesRegex(palpate.Error, "^budget: 1 us: "):

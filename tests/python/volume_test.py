@@ -98,10 +98,30 @@ class FromNumpy(InFolder):
             ("right angles", cube(), sheared(AFFINE), TISSUES),
             ("no volume", cube(), np.diag([0, 0, 0, 1]), TISSUES),
             ("label 2", cube(), AFFINE, {1: "fat"}),
+            ("^tissues: label 1: its name is empty$", cube(), AFFINE, {1: ("", "fat"), 2: "fat"}),
+            ("^tissues: label 1: its name is empty$", cube(), AFFINE, {1: (" ", "fat"), 2: "fat"}),
+            *(("^tissues: label 1: its name holds a control character$", cube(), AFFINE, {1: (f"a{wrong}b", "fat"), 2: "fat"})
+              for wrong in "\0\n\x1f\x7f\x80\x9f"),
+            ("^tissues: labels 1 and 2 are both called 'x'", cube(), AFFINE, {1: ("x", "fat"), 2: ("x", "fat")}),
+            ("^tissues: labels 1 and 2 are both called 'fat'", cube(), AFFINE, {1: ("fat", "skin"), 2: "fat"}),
             ("no tissue 'cheese'", cube(), AFFINE, {1: "fat", 2: "cheese"}),
         ]:
             with self.subTest(wrong), self.assertRaisesRegex((ValueError, palpate.Error), wrong):
                 palpate.Volume.from_numpy(labels, affine, tissues)
+
+    def test_names_may_be_of_any_script_and_labels_may_share_their_tissue(self):
+        volume = palpate.Volume.from_numpy(cube(), AFFINE, {1: ("Ä ö\u00a0乳", "fat"), 2: ("À", "fat")})
+        self.assertEqual([one["name"] for one in volume.info["labels"] if one["tissue"] == "fat"], ["Ä ö\u00a0乳", "À"])
+        palpate.Volume.from_numpy(cube(), AFFINE, {1: "fat", 2: "fat"})
+
+    def test_what_is_wrong_with_a_volume_in_memory_names_no_file(self):
+        for labels, tissues, wrong in ((np.zeros((5, 5, 5), np.uint8), {}, "^has no labels of tissue"),
+                                       (cube(), {1: ("a", "fat"), 2: ("b", "fat")}, "^no tumour or lesion to aim at: choose .* one of a, b$")):
+            volume = palpate.Volume.from_numpy(labels, AFFINE, tissues)
+            with self.subTest(wrong), self.assertRaisesRegex(palpate.Error, wrong):
+                palpate.Scene.for_volume(volume)
+            with self.subTest(wrong), self.assertRaisesRegex(palpate.Error, wrong):
+                palpate.Model(volume)
 
     def test_images_and_affines_of_what_is_no_number_are_refused(self):
         image = np.zeros(cube().shape)
