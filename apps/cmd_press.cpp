@@ -228,7 +228,7 @@ void warnOfCells(const Run& run)
         fmt::print(
             stderr,
             "palpate press: the tool's radius of {:g} mm is less than {:g} cells of {:g} mm: the force depends on where it "
-            "lies between nodes (up to 16 % off at one cell, over 60 % at a quarter of one); a smaller "
+            "lies between nodes (at one cell up to 16 % off from a radius of depth on, more with fewer); a smaller "
             "[model.elastic] spacing_mm resolves it\n",
             1e3 * radius, fewestCells, 1e3 * spacing);
     }
