@@ -57,6 +57,22 @@ class Leaks(InFolder):
         self.assertEqual(palpate.Record(self.folder / "r.db").results["force_hash"], session.force_hash)
 
 
+class Objects(unittest.TestCase):
+    def test_no_object_is_there_without_its_constructor(self):
+        for kind in (palpate.Volume, palpate.Scene, palpate.Model, palpate.Session):
+            with self.subTest(kind), self.assertRaisesRegex(TypeError, "__new__: gives no object"):
+                kind.__new__(kind)
+
+    def test_a_class_may_be_derived(self):
+        class Named(palpate.Scene):
+            def __init__(self, source, tag):
+                super().__init__(source)
+                self.tag = tag
+
+        named = Named("block", tag=3)
+        self.assertEqual((named.name, named.tag), ("block", 3))
+
+
 class Threads(unittest.TestCase):
     def test_sessions_of_one_model_run_side_by_side(self):
         model = small_block()
