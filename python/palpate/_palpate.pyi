@@ -99,7 +99,8 @@ class Volume:
             table: tissue table (.toml) in place of the built-in one.
 
         Raises:
-            ValueError: shapes, types, the affine or the frame are not right; an array has a mask, or is not of numbers.
+            ValueError: shapes, types, the affine or the frame are not right; an array has a mask, or is not of numbers; a
+                structure's name is empty, holds a control character or is there twice.
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:

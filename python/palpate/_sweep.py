@@ -197,15 +197,15 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, any_build=Fa
         retry: run cases that failed again.
         any_build: go on with cases of another build; the table names that of each case.
         progress: called with (done, of) now and then.
-        options: with `cases`: procedure ("press", "needle", "session", or a dict with its keys), outputs, repeats, seed,
-            set (keys of every case), reference (keys that differ in the case that each is compared with), records.
+        options: with `cases`: procedure ("press", "needle", "session", or a dict with its keys), outputs (one or several), repeats,
+            seed, set (keys of every case), reference (keys that differ in the case that each is compared with), records.
 
     Returns:
         SweepResult
 
     Raises:
         palpate.Error: a key or value is wrong (before the first case runs), or another run holds the folder.
-        TypeError, ValueError: jobs is no whole number, or below 1.
+        TypeError, ValueError: jobs is no whole number, or below 1; an argument that there is not; procedure is none.
         KeyboardInterrupt: the rows of the finished cases are in the folder; the same call goes on.
     """
     _need_sweeps()
