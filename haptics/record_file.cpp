@@ -86,11 +86,12 @@ void refuse(const std::string& file, const std::string& why)
     throw base::error("{}: cannot be made: {}", file, why);
 }
 
-void makeFile(const std::string& file, const SessionInfo& info)
+std::vector<SealedPart> makeFile(const std::string& file, const SessionInfo& info)
 {
     checkName(file);
     const std::string part = file + "." + std::to_string(::getpid()) + ".part";
     removeFile(part);
+    std::vector<SealedPart> begun;
     try {
         Database database(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX);
         database.execute("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN");
@@ -100,6 +101,7 @@ void makeFile(const std::string& file, const SessionInfo& info)
             database.execute(statement);
         }
         writeInfo(database, info);
+        begun = sealOfSmallTables(database);
         database.execute("COMMIT; PRAGMA journal_mode = WAL");
     } catch (const std::exception& e) {
         removeFile(part);
@@ -112,6 +114,7 @@ void makeFile(const std::string& file, const SessionInfo& info)
         removeFile(part);
         throw;
     }
+    return begun;
 }
 
 FileId fileId(const std::filesystem::path& file) noexcept

@@ -31,13 +31,9 @@ void addRows(Database& database, const std::string& table, const std::string& sq
     std::map<std::string, int> before;
     Statement rows(database, sql);
     while (rows.step()) {
-        std::string name = fmt::format("{}.{}", table, rows.text(0));
-        if (const int n = before[name]++; n > 0) {
-            name += fmt::format(" ({})", n + 1);  // a key that is there twice
-        }
         RowDigest digest;
         rows.digestRow(digest);
-        parts.push_back(partOf(std::move(name), digest));
+        parts.push_back(partOf(rowPart(table, rows.text(0), before), digest));
     }
 }
 
@@ -148,6 +144,15 @@ std::vector<SealedPart> sealOfSmallTables(Database& database)
     addRows(database, "tissues", "SELECT tissue, name FROM tissues ORDER BY tissue", parts);
     addRows(database, "results", "SELECT key, value FROM results ORDER BY rowid", parts);
     return parts;
+}
+
+std::string rowPart(std::string_view table, std::string_view key, std::map<std::string, int>& before)
+{
+    std::string name = fmt::format("{}.{}", table, key);
+    if (const int n = before[name]++; n > 0) {
+        name += fmt::format(" ({})", n + 1);  // a key that is there twice
+    }
+    return name;
 }
 
 std::vector<SealedPart> sealOfTicks(Database& database, const TickColumns& columns)

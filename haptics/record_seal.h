@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -75,6 +76,9 @@ private:
 /// The parts of the tables that are written at the beginning and at the end, from the file: tables, session, structures,
 /// tissues, results.
 std::vector<SealedPart> sealOfSmallTables(Database& database);
+
+/// The part of one row of such a table; `before` counts the keys that there are.
+std::string rowPart(std::string_view table, std::string_view key, std::map<std::string, int>& before);
 
 /// The parts of the tables that grow, from the file.
 std::vector<SealedPart> sealOfTicks(Database& database, const TickColumns& columns);

@@ -46,9 +46,10 @@ std::string tickInsert(const TickColumns& of)
 
 }  // namespace
 
-Writer::Writer(Database& database, const TickColumns& columns)
+Writer::Writer(Database& database, const TickColumns& columns, std::vector<SealedPart> begun)
     : database_(database),
       columns_(columns),
+      begun_(std::move(begun)),
       tick_(database, tickInsert(columns)),
       event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
       core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
@@ -80,9 +81,31 @@ void Writer::write(const TickRecord& record)
     }
 }
 
-void Writer::seal()
+void Writer::close(std::uint64_t lost, const Results& results)
 {
-    std::vector<SealedPart> parts = sealOfSmallTables(database_);
+    database_.execute("DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
+    std::map<std::string, int> keys;
+    const auto insert = [&](const char* table, std::string_view key, const auto& value,
+                            std::map<std::string, int>& before) {
+        RowDigest digest;
+        insertPair(database_, table, key, value, &digest);
+        return SealedPart{rowPart(table, key, before), digest.rows(), digest.text()};
+    };
+    const std::vector<SealedPart> ended{insert("session", "complete", std::int64_t{1}, keys),
+                                        insert("session", "lost_ticks", static_cast<std::int64_t>(lost), keys)};
+    for (const auto& [key, value] : results) {
+        results_.push_back(insert("results", key, std::string_view(value), resultKeys_));
+    }
+    seal(ended);
+}
+
+void Writer::seal(const std::vector<SealedPart>& ended)
+{
+    std::vector<SealedPart> parts = begun_;
+    const auto isOfSession = [](const SealedPart& p) { return p.part.starts_with("session."); };
+    const auto session = std::find_if(parts.rbegin(), parts.rend(), isOfSession);
+    parts.insert(session.base(), ended.begin(), ended.end());
+    std::ranges::copy(results_, std::back_inserter(parts));
     std::ranges::move(seal_.parts(), std::back_inserter(parts));
     parts.push_back(sealOf(parts));
     database_.execute("DELETE FROM seal");

@@ -27,10 +27,10 @@ namespace palpate::haptics {
 using format::Database;
 using format::FileId;
 using format::fileId;
-using format::insertPair;
 using format::makeFile;
 using format::refuse;
 using format::removeFile;
+using format::Results;
 using format::Writer;
 
 namespace {
@@ -41,7 +41,6 @@ constexpr std::chrono::seconds shortLock{2}, longestLock{10};
 constexpr std::size_t ticksPerTransaction = 4096;  // bounds the write-ahead log
 
 using Clock = std::chrono::steady_clock;
-using Results = std::vector<std::pair<std::string, std::string>>;
 
 // The writer thread takes no signals; one about the size of files (RLIMIT_FSIZE) would end the process.
 class SignalsBlocked {
@@ -96,7 +95,7 @@ struct Recorder::Impl {
         while (ring.push(TickRecord{})) {
         }
         ring.reset();
-        makeFile(file, info);
+        std::vector<format::SealedPart> begun = makeFile(file, info);
         place = std::filesystem::absolute(file);
         written = fileId(place);
         try {
@@ -107,7 +106,7 @@ struct Recorder::Impl {
             database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
             database->execute("UPDATE session SET value = value");
             sqlite3_busy_timeout(database->get(), lockedWait);
-            writer.emplace(*database, format::columnsOf(info));
+            writer.emplace(*database, format::columnsOf(info), std::move(begun));
             const SignalsBlocked inherited;
             thread = std::thread([this] { work(); });
         } catch (const std::exception& e) {
@@ -209,13 +208,7 @@ struct Recorder::Impl {
     void complete(const Results& values)
     {
         begin(true);
-        database->execute("DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
-        insertPair(*database, "session", "complete", std::int64_t{1});
-        insertPair(*database, "session", "lost_ticks", static_cast<std::int64_t>(lost.load()));
-        for (const auto& [key, value] : values) {
-            insertPair(*database, "results", key, std::string_view(value));
-        }
-        writer->seal();
+        writer->close(lost.load(), values);
         database->execute("COMMIT");
     }
 

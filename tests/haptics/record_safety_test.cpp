@@ -1,3 +1,4 @@
+#include <haptics/record_check.h>
 #include <haptics/recorder.h>
 
 #include <tests/error_of.h>
@@ -112,6 +113,56 @@ TEST(RecordSafety, ALockThatOutlastsTheRingEndsTheRecord)
     recorder.finish({});
     expectRefusal(file, "recording stopped: database is locked", recorder.error());
     EXPECT_FALSE(recorder.whole());
+}
+
+// The seal is of what was written, not of what is found when the session ends.
+TEST(RecordSafety, WhatAnotherProgramChangesDuringTheSessionIsNotSealed)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const std::vector<std::pair<const char*, const char*>> edits{
+        {"UPDATE session SET value = 'P-08' WHERE key = 'operator'", "session.operator is not what was written"},
+        {"DELETE FROM session WHERE key = 'host'", "session.host is gone"},
+        {"INSERT INTO session VALUES ('extra.note', 'x')", "session.extra.note was added"},
+        {"UPDATE structures SET warn_distance_m = 0.5 WHERE structure = 1", "structures.1 is not what was written"},
+        {"UPDATE tissues SET name = 'lard' WHERE tissue = 2", "tissues.2 is not what was written"},
+        {"INSERT INTO results VALUES ('score_total', '99')", "results.score_total (2) was added"},
+        {"CREATE INDEX i ON ticks (total_y_n)", "tables and indexes: 10 rows where 9 were written"}};
+    for (const auto& [sql, words] : edits) {
+        const auto file = folder / "a.palpate";
+        {
+            Recorder recorder(file, synthetic::info());
+            recorder.push({});
+            recorder.flush();
+            tests::executeSql(file, sql);
+            recorder.finish({{"score_total", "61.2"}});
+            EXPECT_EQ(recorder.error(), "");
+        }
+        const Seal seal = Record(file).seal();
+        EXPECT_EQ(seal.state, Seal::State::broken) << sql;
+        EXPECT_NE(someOf(seal.changed).find(words), std::string::npos) << sql << ": " << someOf(seal.changed);
+        std::filesystem::remove(file);
+    }
+}
+
+// Results of both are sealed, also those of one key.
+TEST(RecordSafety, ARecordThatEndsTwiceIsWhole)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const auto file = folder / "a.palpate";
+    {
+        Recorder recorder(file, synthetic::info());
+        recorder.push({});
+        recorder.finish({{"note", "a"}, {"note", "b"}});
+        TickRecord last;
+        last.tick = 1;
+        recorder.push(last);
+        recorder.finish({{"note", "c"}});
+        last.tick = 2;
+        recorder.push(last);
+    }
+    const Seal seal = Record(file).seal();
+    EXPECT_EQ(seal.state, Seal::State::whole) << someOf(seal.changed);
+    EXPECT_EQ(Record(file).ticks(), 3U);
 }
 
 }  // namespace
