@@ -22,6 +22,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -98,14 +99,24 @@ struct ReplayPlayer::Impl {
           publisher(publisherOf(session, model))
     {
         playback.length = static_cast<double>(length - 1) * period;
-        computing = std::thread([this] { compute(); });
-        showing = std::thread([this] { show(); });
+        try {
+            computing = std::thread([this] { compute(); });
+            showing = std::thread([this] { show(); });
+        } catch (const std::system_error& e) {
+            end();
+            throw base::error("{}: cannot be played: no thread can be started ({}); end other programs", file, e.what());
+        }
     }
-    ~Impl()
+    ~Impl() { end(); }
+
+    void end()
     {
         stop = true;
-        computing.join();
-        showing.join();
+        for (std::thread* thread : {&computing, &showing}) {
+            if (thread->joinable()) {
+                thread->join();
+            }
+        }
     }
 
     void blame(const char* words, const std::string& what)

@@ -107,6 +107,9 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
     impl.inode = status.st_ino;
     if (impl.bytes >= sizeof(Header))
         impl.mapping = Mapping(*file, impl.bytes, PROT_READ);
+    base::failIf(impl.bytes >= sizeof(Header) && !impl.mapping,
+                 "session {}: its shared memory of {} MB cannot be mapped: {}; end other programs", session,
+                 impl.bytes / 1000000, std::strerror(errno));
     impl.header = impl.mapping ? &impl.at<Header>(0) : nullptr;
     base::failIf(impl.header == nullptr || impl.header->magic.load(std::memory_order_acquire) != magic,
                  "session {}: its shared memory was not made by palpate; remove {}", session, segmentFolder + impl.name);

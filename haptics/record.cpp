@@ -60,12 +60,15 @@ struct Record::Impl {
     explicit Impl(const std::filesystem::path& path) : file(pathOf(path))
     {
         guarded([&] {
-            database.emplace(file, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX);
-            // A file from anywhere: its own SQL may call no function but harmless ones, and no value takes all memory.
-            sqlite3_db_config(database->get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-            sqlite3_db_config(database->get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-            sqlite3_limit(database->get(), SQLITE_LIMIT_LENGTH, longestValue);
-            Statement(*database, "SELECT count(*) FROM sqlite_master").step();
+            try {
+                open(format::placeOf(path), 0);
+            } catch (const std::exception&) {
+                // On a medium that cannot be written: a log's index cannot be made there, and without a log none is needed.
+                if (!cannotBeWritten() || logIsThere()) {
+                    throw;
+                }
+                open(format::immutable(path), SQLITE_OPEN_URI);
+            }
         });
         checkFormat();
         guarded([&] {
@@ -76,15 +79,38 @@ struct Record::Impl {
         guarded([&] { checkTables(); });
     }
 
+    void open(const std::string& name, int flags)
+    {
+        database.emplace(name, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX | flags);
+        // A file from anywhere: its own SQL may call no function but harmless ones, and no value takes all memory.
+        sqlite3_db_config(database->get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+        sqlite3_db_config(database->get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+        sqlite3_limit(database->get(), SQLITE_LIMIT_LENGTH, longestValue);
+        Statement(*database, "SELECT count(*) FROM sqlite_master").step();
+    }
+
+    bool cannotBeWritten() const
+    {
+        const int kind = database ? sqlite3_errcode(database->get()) & 0xFF : SQLITE_CANTOPEN;
+        return kind == SQLITE_CANTOPEN || kind == SQLITE_READONLY;
+    }
+
+    bool logIsThere() const
+    {
+        std::error_code none;
+        const auto bytes = std::filesystem::file_size(file + "-wal", none);
+        return !none && bytes > 0;
+    }
+
     // Gives SQLite's errors the file's name and a way out.
     void guarded(const auto& work) const
     {
         try {
             work();
         } catch (const std::exception& e) {
-            const int status = database ? sqlite3_errcode(database->get()) : SQLITE_CANTOPEN;
-            base::failIf(status == SQLITE_NOTADB, "{}: is not a session record; palpate train --record writes one", file);
-            base::failIf(status == SQLITE_CANTOPEN,
+            base::failIf(database && sqlite3_errcode(database->get()) == SQLITE_NOTADB,
+                         "{}: is not a session record; palpate train --record writes one", file);
+            base::failIf(cannotBeWritten(),
                          "{}: cannot be opened ({}); copy it, with its -wal file, to a folder that you can read and write",
                          file, e.what());
             throw base::error("{}: is damaged ({}); copy it again or take another record", file, e.what());
@@ -94,10 +120,8 @@ struct Record::Impl {
     // SQLite takes the bytes missing from a last page for zeros. While a log is there a page may rightly be half written.
     void checkWholePages()
     {
-        std::error_code none;
-        const auto log = std::filesystem::file_size(file + "-wal", none);
         const auto page = static_cast<std::uintmax_t>(single(*database, "PRAGMA page_size"));
-        base::failIf((none || log == 0) && std::filesystem::file_size(file) % page != 0, "its end is missing");
+        base::failIf(!logIsThere() && std::filesystem::file_size(file) % page != 0, "its end is missing");
     }
 
     void checkFormat()

@@ -93,7 +93,7 @@ std::vector<SealedPart> makeFile(const std::string& file, const SessionInfo& inf
     removeFile(part);
     std::vector<SealedPart> begun;
     try {
-        Database database(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX);
+        Database database(placeOf(part), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX);
         database.execute("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN");
         database.execute("PRAGMA application_id = " + std::to_string(applicationId));
         database.execute("PRAGMA user_version = " + std::to_string(version));

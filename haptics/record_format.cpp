@@ -2,6 +2,8 @@
 
 #include <base/error.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <locale>
@@ -42,6 +44,21 @@ std::string columnList(const TickColumns& columns)
         list += column;
     });
     return list;
+}
+
+std::string placeOf(const std::filesystem::path& file)
+{
+    return std::filesystem::absolute(file).string();
+}
+
+std::string immutable(const std::filesystem::path& file)
+{
+    std::string name = "file:";
+    for (const char c : placeOf(file)) {
+        const bool special = c == '%' || c == '?' || c == '#';
+        name += special ? fmt::format("%{:02X}", static_cast<unsigned char>(c)) : std::string(1, c);
+    }
+    return name + "?immutable=1";
 }
 
 Database::Database(const std::string& file, int flags)

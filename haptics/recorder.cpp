@@ -99,7 +99,7 @@ struct Recorder::Impl {
         place = std::filesystem::absolute(file);
         written = fileId(place);
         try {
-            database.emplace(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+            database.emplace(place.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
             // A killed process loses nothing that was committed, so no commit has to wait for the disk. NORMAL syncs when a
             // log is begun, which the update does before the session, and when it is folded into the file, which then is
             // left to the end: a sync may take a second on a busy disk.
@@ -227,7 +227,7 @@ struct Recorder::Impl {
         }
         const std::string why = sqlite3_errmsg(database->get());
         return file + ": is whole only together with " + file + "-wal: " + why + "; make room, then sqlite3 " +
-               base::shellWord(file) + " 'PRAGMA journal_mode = DELETE' makes one file of both";
+               base::shellWord(place.string()) + " 'PRAGMA journal_mode = DELETE' makes one file of both";
     }
 
     // Writing to a file that has lost its name succeeds, and nobody finds it.

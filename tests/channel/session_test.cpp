@@ -340,6 +340,17 @@ TEST(Session, HalfBuiltOrForeignSegmentsAreRefused)
     }
 }
 
+// Larger than any address space: the mapping fails as it does without memory, and nobody else's segment is to blame.
+TEST(Session, ASegmentThatCannotBeMappedIsNotCalledForeign)
+{
+    const std::string session = sessionNamed("huge");
+    const base::Descriptor file(::shm_open(segmentName(session).c_str(), O_RDWR | O_CREAT | O_EXCL, 0600));
+    ASSERT_EQ(::ftruncate(*file, off_t{1} << 48), 0);
+    const std::string error = tests::errorOf([&] { Subscriber::attach(session); });
+    removeSegment(session);
+    EXPECT_NE(error.find("cannot be mapped: Cannot allocate memory"), std::string::npos) << error;
+}
+
 TEST(Session, EndsAsFinishedByStatusAndByTheEndOfItsPublisher)
 {
     const std::string session = sessionNamed("ends");

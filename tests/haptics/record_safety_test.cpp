@@ -9,9 +9,13 @@
 
 #include <sqlite3.h>
 
+#include <fcntl.h>
+
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <thread>
 
@@ -163,6 +167,65 @@ TEST(RecordSafety, ARecordThatEndsTwiceIsWhole)
     const Seal seal = Record(file).seal();
     EXPECT_EQ(seal.state, Seal::State::whole) << someOf(seal.changed);
     EXPECT_EQ(Record(file).ticks(), 3U);
+}
+
+/// While it lives, the working folder is another.
+class WorkingFolder {
+public:
+    explicit WorkingFolder(const std::filesystem::path& folder) { std::filesystem::current_path(folder); }
+    ~WorkingFolder() { std::filesystem::current_path(before_); }
+    WorkingFolder& operator=(WorkingFolder&&) = delete;
+
+private:
+    std::filesystem::path before_ = std::filesystem::current_path();
+};
+
+// SQLite takes some names for addresses.
+TEST(RecordSafety, ANameIsTheNameOfAFile)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const WorkingFolder here(folder.path());
+    const std::vector<const char*> names{"file:z.db", "file:z.db?mode=memory", ":memory:", "file:"};
+    for (const char* name : names) {
+        synthetic::record(name, synthetic::info(), {TickRecord{}});
+        EXPECT_EQ(Record(name).seal().state, Seal::State::whole) << name;
+        EXPECT_TRUE(std::filesystem::exists(folder / name));
+    }
+    const std::filesystem::directory_iterator files(folder.path());
+    EXPECT_EQ(static_cast<std::size_t>(std::distance(begin(files), end(files))), names.size());
+}
+
+int openReadOnly(const char* file, int flags, int mode)
+{
+    errno = EROFS;
+    return (flags & (O_WRONLY | O_RDWR | O_CREAT)) != 0 ? -1 : ::open(file, flags, mode);
+}
+
+/// While it lives, SQLite can write no file, as on a medium that is read only.
+class ReadOnlyMedium {
+public:
+    ReadOnlyMedium() { vfs_->xSetSystemCall(vfs_, "open", reinterpret_cast<sqlite3_syscall_ptr>(openReadOnly)); }
+    ~ReadOnlyMedium() { vfs_->xSetSystemCall(vfs_, nullptr, nullptr); }
+    ReadOnlyMedium& operator=(ReadOnlyMedium&&) = delete;
+
+private:
+    sqlite3_vfs* vfs_ = sqlite3_vfs_find(nullptr);
+};
+
+// A viewer that was still there when the session ended leaves a record in mode WAL, and whoever closes it last no log.
+TEST(RecordSafety, ARecordWithoutItsLogIsReadFromAReadOnlyMedium)
+{
+    const synthetic::Folder folder(tests::memoryFolder());
+    const auto file = folder / "a 50 %#?.palpate", whole = folder / "b.palpate";
+    synthetic::record(file, synthetic::info(), {TickRecord{}});
+    std::filesystem::copy_file(file, whole);
+    tests::executeSql(file, "PRAGMA journal_mode = WAL");
+    const ReadOnlyMedium medium;
+    EXPECT_EQ(Record(whole).seal().state, Seal::State::whole);
+    EXPECT_EQ(Record(file).seal().state, Seal::State::whole);
+    std::ofstream(file.string() + "-wal") << "what was not folded yet";
+    expectRefusal(file, "copy it, with its -wal file, to a folder that you can read and write",
+                  tests::errorOf([&] { Record{file}; }));
 }
 
 }  // namespace
