@@ -1,5 +1,6 @@
 #include <haptics/record_file.h>
 
+#include <base/descriptor.h>
 #include <base/error.h>
 #include <haptics/record_format.h>
 #include <haptics/record_writer.h>
@@ -108,6 +109,9 @@ std::vector<SealedPart> makeFile(const std::string& file, const SessionInfo& inf
         refuse(file, e.what());
     }
     try {
+        if (const base::Descriptor made(::open(part.c_str(), O_RDONLY | O_CLOEXEC)); made) {
+            ::fsync(*made);  // a log is nothing without its file
+        }
         checkName(file);  // a log that lies there would be taken for this record's
         giveName(part, file);
     } catch (const std::exception&) {

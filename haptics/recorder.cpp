@@ -3,6 +3,7 @@
 #include <haptics/record_bounds.h>
 #include <haptics/record_file.h>
 #include <haptics/record_format.h>
+#include <haptics/record_sync.h>
 #include <haptics/record_writer.h>
 #include <haptics/recorder.h>
 
@@ -74,6 +75,8 @@ struct Recorder::Impl {
     std::atomic<std::uint64_t> lost{0};
     std::optional<Database> database;
     std::optional<Writer> writer;
+    std::uint64_t syncEvery, unsynced = 0;  // ticks
+    std::optional<format::LogSync> sync;    // of the log
 
     mutable std::mutex mutex;  // guards what follows; the servo thread never takes it
     std::condition_variable wake, served;
@@ -89,7 +92,9 @@ struct Recorder::Impl {
 
     // The ring holds eight seconds at the session's rate, and never less than eight at 1 kHz.
     Impl(const std::string& path, const SessionInfo& info)
-        : file(path), ring(static_cast<std::size_t>(std::clamp(8 * info.rate, 8192.0, 65536.0)))
+        : file(path),
+          ring(static_cast<std::size_t>(std::clamp(8 * info.rate, 8192.0, 65536.0))),
+          syncEvery(static_cast<std::uint64_t>(5 * info.rate))
     {
         // Touches every page of the ring now and not in the servo loop.
         while (ring.push(TickRecord{})) {
@@ -101,13 +106,14 @@ struct Recorder::Impl {
         try {
             database.emplace(place.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
             // A killed process loses nothing that was committed, so no commit has to wait for the disk. NORMAL syncs when a
-            // log is begun, which the update does before the session, and when it is folded into the file, which then is
-            // left to the end: a sync may take a second on a busy disk.
+            // log is begun, which is done before the session, and when it is folded into the file, which then is
+            // left to the end: a sync may take a second on a busy disk. In between, LogSync does it beside this thread.
             database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
-            database->execute("UPDATE session SET value = value");
+            database->execute("PRAGMA user_version = " + std::to_string(format::version));  // as it is: begins the log
             sqlite3_busy_timeout(database->get(), lockedWait);
             writer.emplace(*database, format::columnsOf(info), std::move(begun));
             const SignalsBlocked inherited;
+            sync.emplace(place.string() + "-wal");
             thread = std::thread([this] { work(); });
         } catch (const std::exception& e) {
             removeFile(file);
@@ -169,6 +175,16 @@ struct Recorder::Impl {
         }
     }
 
+    // Every five seconds, so that a power cut takes no more than that.
+    void syncAfter(std::size_t ticks)
+    {
+        unsynced += ticks;
+        if (unsynced >= syncEvery) {
+            sync->begin();
+            unsynced = 0;
+        }
+    }
+
     // Returns what went wrong, or nothing.
     std::string store(const std::optional<Results>& toFinish, bool last, bool awaited) noexcept
     {
@@ -189,6 +205,7 @@ struct Recorder::Impl {
                 })) {
                 }
                 database->execute("COMMIT");
+                syncAfter(taken);
             } while (taken == ticksPerTransaction);
             taken = 0;
             if (toFinish || (last && !closed)) {

@@ -10,7 +10,11 @@
 #include <sqlite3.h>
 
 #include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <filesystem>
@@ -20,6 +24,24 @@
 #include <thread>
 
 // What was recorded is not lost, whatever else is done to its files.
+
+namespace {
+
+std::atomic<ino_t> watchedLog{0};
+std::atomic<int> logSyncs{0};
+
+}  // namespace
+
+// In the place of the C library's, to see what is brought to the disk.
+extern "C" int fdatasync(int descriptor)
+{
+    struct stat s {};
+    const int done = static_cast<int>(::syscall(SYS_fdatasync, descriptor));
+    if (::fstat(descriptor, &s) == 0 && s.st_ino == watchedLog) {
+        ++logSyncs;
+    }
+    return done;
+}
 
 namespace palpate::haptics {
 namespace {
@@ -226,6 +248,31 @@ TEST(RecordSafety, ARecordWithoutItsLogIsReadFromAReadOnlyMedium)
     std::ofstream(file.string() + "-wal") << "what was not folded yet";
     expectRefusal(file, "copy it, with its -wal file, to a folder that you can read and write",
                   tests::errorOf([&] { Record{file}; }));
+}
+
+// A power cut loses what the disk does not have: the log is brought there every five seconds of ticks.
+TEST(RecordSafety, TheLogIsBroughtToTheDiskWhileTheSessionRuns)
+{
+    const synthetic::Folder folder;
+    const auto file = folder / "a.palpate";
+    Recorder recorder(file, synthetic::info());
+    struct stat log {};
+    ASSERT_EQ(::stat((file.string() + "-wal").c_str(), &log), 0);
+    watchedLog = log.st_ino;
+    TickRecord tick;
+    for (const bool enough : {false, true}) {
+        for (const std::uint64_t until = enough ? 5000 : 4999; tick.tick < until; ++tick.tick) {
+            recorder.push(tick);
+        }
+        recorder.flush();
+        EXPECT_TRUE(enough || logSyncs == 0) << "nothing else brings it there";
+    }
+    while (logSyncs == 0) {  // for ever, if that failed
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    recorder.finish({});
+    EXPECT_EQ(Record(file).seal().state, Seal::State::whole);
+    watchedLog = 0;
 }
 
 }  // namespace
