@@ -40,7 +40,8 @@ constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
                                              {2.0, 0.0, 0.0, 0.0, 0.0}}};
 // Cosine between a capsule and its way up to which it lies: what is small then is a strip, of many points.
 constexpr double steep = 0.7;
-// Depth in radii from which on the surface lies around a small tool: points as dense as its cells make them too stiff there.
+// Depth in radii from which on the surface lies around a small tool: points as dense as its cells make them too stiff
+// there.
 constexpr double deep = 0.5;
 // Radius of a patch, in cells, up to which surface points lie as close to each other as that, in cells.
 struct Closeness {
@@ -203,7 +204,8 @@ double resolvedShare(double radiusInCells, const Between& across, const Lacking&
     const LackingAt &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
     const double soft = std::max(glm::mix(lacksAt(from), lacksAt(to), t), 0.0);
-    const double compressible = 0.6 * more.compressible * std::min(4.0 * radiusInCells, 1.0);
+    const double fades = std::max(0.5 * radiusInCells, 1.0);
+    const double compressible = 0.6 * more.compressible * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
     const double sliver = more.sliver * std::min(2.0 * radiusInCells, 1.0);
     return 1.0 / (1.0 + penalty * (more.times * (soft + compressible) + sliver));
 }
