@@ -258,7 +258,7 @@ struct Lacking {
 /// on grids shifted along the surface and across it; `palpate accuracy --verify` has the errors that are left.
 ///
 /// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance. Tissue with nu
-/// under 0.47 lacks 0.6 (0.47 - nu) h / E more, where E is 2.9 mu, and less than that under a quarter of a cell; its g, q
+/// under 0.47 lacks 0.6 (0.47 - nu) h / E more, where E is 2.9 mu, and less than that under 1/4 and over 2 cells; its g, q
 /// and x are 1 + 1.2 (0.47 - nu) times as large: by the same measurements at nu 0, 0.2 and 0.35.
 /// @param radiusInCells  in cells of its window
 /// @param across  betweenNodes() of the tool
