@@ -205,7 +205,8 @@ double resolvedShare(double radiusInCells, const Between& across, const Lacking&
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
     const double soft = std::max(glm::mix(lacksAt(from), lacksAt(to), t), 0.0);
     const double fades = std::max(0.5 * radiusInCells, 1.0);
-    const double compressible = 0.6 * more.compressible * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
+    const double compressible =
+        0.6 * more.compressible * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
     const double sliver = more.sliver * std::min(2.0 * radiusInCells, 1.0);
     return 1.0 / (1.0 + penalty * (more.times * (soft + compressible) + sliver));
 }
