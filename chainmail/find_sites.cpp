@@ -203,6 +203,7 @@ private:
     {
         const double spacing = body_.levels.front().nodes.spacing, edge = body_.pieceEdge;
         const int pieces = piecesUnder(tool, spacing, edge);
+        const double fine = 0.5 * smallPatch * smallPatch * spacing / tool.shape.widest();
         for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
             if (count_ == out_.size()) {
                 return;
@@ -217,9 +218,7 @@ private:
             site.area = point.area;
             const bool added = addIfNear(shape, site);
             if (added && pieces > 1 && static_cast<double>(point.area) > slight * edge * edge) {
-                divideLast(
-                    shape, pieces,
-                    pieces > 2 ? std::min(close, 0.5 * smallPatch * smallPatch * spacing / tool.shape.widest()) : close);
+                divideLast(shape, pieces, pieces > 2 ? std::min(close, fine) : close);
             }
         }
     }

@@ -67,7 +67,7 @@ struct Record::Impl {
                 if (!cannotBeWritten() || logIsThere()) {
                     throw;
                 }
-                open(format::immutable(path), SQLITE_OPEN_URI);
+                open(format::uriOf(path, true), SQLITE_OPEN_URI);
             }
         });
         checkFormat();

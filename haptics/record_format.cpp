@@ -51,14 +51,14 @@ std::string placeOf(const std::filesystem::path& file)
     return std::filesystem::absolute(file).string();
 }
 
-std::string immutable(const std::filesystem::path& file)
+std::string uriOf(const std::filesystem::path& file, bool isImmutable)
 {
     std::string name = "file:";
     for (const char c : placeOf(file)) {
         const bool special = c == '%' || c == '?' || c == '#';
         name += special ? fmt::format("%{:02X}", static_cast<unsigned char>(c)) : std::string(1, c);
     }
-    return name + "?immutable=1";
+    return name + (isImmutable ? "?immutable=1" : "");
 }
 
 Database::Database(const std::string& file, int flags)

@@ -149,8 +149,9 @@ std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info)
 /// For Database: the file of this name, where SQLite would take "file:a.db" or ":memory:" for something else.
 std::string placeOf(const std::filesystem::path& file);
 
-/// For Database, with SQLITE_OPEN_URI: the file as it lies on a medium that cannot be written, without a look at locks.
-std::string immutable(const std::filesystem::path& file);
+/// For Database, with SQLITE_OPEN_URI.
+/// @param isImmutable  read as it lies on a medium that cannot be written, without a look at locks; not beside a log
+std::string uriOf(const std::filesystem::path& file, bool isImmutable);
 
 /// An open SQLite file. Errors come as std::runtime_error with SQLite's words and without the file's name.
 class Database {

@@ -166,18 +166,11 @@ bool canBeWritten(const fs::path& place)
     return ::faccessat(AT_FDCWD, place.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
-// For SQLite: a file without a log is read as it is, since a log's index could not be made beside it.
+// A file without a log is read as it is, since a log's index could not be made beside it.
 std::string readOnlyName(const fs::path& file)
 {
-    std::string name = "file:";
-    for (const char c : file.string()) {
-        name += std::string_view("%?#").find(c) != std::string_view::npos
-                    ? fmt::format("%{:02X}", static_cast<unsigned char>(c))
-                    : std::string(1, c);
-    }
     std::error_code none;
-    const bool log = fs::exists(file.string() + "-wal", none);
-    return name + (log ? "" : "?immutable=1");
+    return haptics::format::uriOf(file, !fs::exists(file.string() + "-wal", none));
 }
 
 // Does the work, and says which file its errors are about.
