@@ -23,6 +23,31 @@ constexpr double maxBalance = 1.5;  // of forces that are far from balanced: the
 // Source: R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949.
 constexpr double slipsWhole = 1.5;
 
+// By how much a site's force falls with each component of its way [N/m].
+glm::dmat3 tangentOf(const ContactSite& s) noexcept
+{
+    return s.limit > 0.0 ? glm::dmat3(s.resist({1, 0, 0}), s.resist({0, 1, 0}), s.resist({0, 0, 1}))
+                         : s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
+}
+
+// What the nodes of a cell get of its sites. False where none touches.
+template <typename Of, typename T>
+bool addUp(std::span<const ContactSite> sitesOfCell, const Of& of, std::array<T, 8>& sum) noexcept
+{
+    bool touches = false;
+    for (const ContactSite& s : sitesOfCell) {
+        if (!s.active()) {
+            continue;
+        }
+        touches = true;
+        const T value = of(s);
+        for (std::size_t c = 0; c < sum.size(); ++c) {
+            sum[c] += static_cast<double>(s.fraction[c]) * value;
+        }
+    }
+    return touches;
+}
+
 }  // namespace
 
 Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const Focus& focus)
@@ -39,7 +64,7 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
     foundFor_.reserve(maxTools);
     tiesFound_.reserve(maxTies);
     toolAt_.reserve(maxTools);
-    slip_.assign(body.points.size(), Slip());
+    slips_.reserve(sites_.size());
 }
 
 std::size_t Elastic::nodes() const noexcept
@@ -202,35 +227,34 @@ double Elastic::refreshResidual(bool isCopied) noexcept
     if (!isCopied) {
         stack_.copy(Field::a, Field::r);
     }
-    for (const ContactSite& s : sites()) {
-        if (!s.active()) {
-            continue;
+    forEachCell(sites(), [&](std::span<const ContactSite> sitesOfCell) {
+        std::array<Vec3, 8> sum{};
+        if (!addUp(
+                sitesOfCell, [](const ContactSite& s) { return s.force; }, sum)) {
+            return;
         }
-        const Layout& l = stack_[s.level].layout;
-        for (int c = 0; c < 8; ++c) {
-            stack_.addForce(s.level, l.corner(s.node, c),
-                            static_cast<double>(s.fraction[static_cast<std::size_t>(c)]) * s.force);
+        const ContactSite& any = sitesOfCell.front();
+        for (std::size_t c = 0; c < sum.size(); ++c) {
+            stack_.addForce(any.level, stack_[any.level].layout.corner(any.node, static_cast<int>(c)), sum[c]);
         }
-    }
+    });
     return std::sqrt(stack_.dot(Field::r, Field::r));
 }
 
 void Elastic::prepareContacts() noexcept
 {
     multigrid_.clearContacts();
-    for (const ContactSite& s : sites()) {
-        if (!s.active()) {
-            continue;
+    forEachCell(sites(), [&](std::span<const ContactSite> sitesOfCell) {
+        std::array<glm::dmat3, 8> sum;
+        sum.fill(glm::dmat3(0.0));
+        if (!addUp(sitesOfCell, tangentOf, sum)) {
+            return;
         }
-        const glm::dmat3 tangent =
-            s.limit > 0.0 ? glm::dmat3(s.resist({1, 0, 0}), s.resist({0, 1, 0}), s.resist({0, 0, 1}))
-                          : s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
-        const Layout& l = stack_[s.level].layout;
-        for (int c = 0; c < 8; ++c) {
-            const double fraction = static_cast<double>(s.fraction[static_cast<std::size_t>(c)]);
-            multigrid_.addContact(s.level, l.corner(s.node, c), fraction * tangent);
+        const ContactSite& any = sitesOfCell.front();
+        for (std::size_t c = 0; c < sum.size(); ++c) {
+            multigrid_.addContact(any.level, stack_[any.level].layout.corner(any.node, static_cast<int>(c)), sum[c]);
         }
-    }
+    });
     multigrid_.prepare();
 }
 

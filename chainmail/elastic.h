@@ -217,6 +217,8 @@ private:
     void moveSites(double length) noexcept;
     void drag(const ElasticLoad& load) noexcept;
     void letSlip() noexcept;
+    void keepSlips() noexcept;
+    void takeSlips(std::span<ContactSite> found) noexcept;
     double frictionOf(const ContactSite& site) const noexcept;
     double searchParabola(const Direction& to, ElasticResult& result) noexcept;
     bool warmStart(ElasticResult& result) noexcept;
@@ -255,13 +257,15 @@ private:
     std::vector<HeldTool> held_;                // of each tool
     std::vector<ElasticTool> tools_;            // as the body feels them
     std::vector<occupancy::RoundCone> toolAt_;  // in the last call
+    // ContactSite::slip and limit, from one search for sites to the next.
     struct Slip {
+        std::uint32_t point = 0;
+        std::uint16_t owner = 0;
+        Vec3f rest{0.0F};  // of a piece of the point [m]
         Vec3f way{0.0F};
         float limit = 0;
-        std::uint32_t search = 0;  // that it was kept for
     };
-    std::vector<Slip> slip_;  // ContactSite::slip and limit of each surface point, from one search for sites to the next
-    std::uint32_t searches_ = 0;  // for surface points
+    std::vector<Slip> slips_;  // of what friction holds, in the order of sites: by tool, and there by point
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is

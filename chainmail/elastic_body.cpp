@@ -132,7 +132,7 @@ std::vector<float> touchedModuli(const FinestLevel& all)
 
 // What a cell with little tissue lacks of the compliance under a contact. It takes its strain further in than its tissue
 // lies (withoutSliver()), by `inwards` along the surface's normal, in halves of a cell. Fitted to a ball on a half-space,
-// see resolvedShare().
+// see ResolvedShare.
 float sliverLacks(const CellLevel& finest, Vec3 anchor, Vec3 normal)
 {
     constexpr double most = 0.26;

@@ -191,35 +191,42 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
             glm::mix(mean.product, 0.5 * (sum * sum - square), isRound)};
 }
 
-double resolvedShare(double radiusInCells, const Between& across, const Lacking& more) noexcept
+ResolvedShare::ResolvedShare(double radiusInCells, const Between& across) noexcept
 {
     const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
                                         [](const LackingAt& l, double t) { return l.radius < t; });
-    const double uneven = 1.0 + 1.2 * more.compressible;
-    const auto lacksAt = [&](const LackingAt& l) {
-        return l.mean + uneven * (l.sum * (across.sum - mean.sum) + l.square * (across.square - mean.square) +
-                                  l.product * (across.product - mean.product));
-    };
     const LackingAt &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
-    const double soft = std::max(glm::mix(lacksAt(from), lacksAt(to), t), 0.0);
+    const auto at = [&](double LackingAt::*value) { return glm::mix(from.*value, to.*value, t); };
+    mean_ = at(&LackingAt::mean);
+    uneven_ = at(&LackingAt::sum) * (across.sum - mean.sum) + at(&LackingAt::square) * (across.square - mean.square) +
+              at(&LackingAt::product) * (across.product - mean.product);
     const double fades = std::max(0.5 * radiusInCells, 1.0);
-    const double compressible =
-        0.6 * more.compressible * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
-    const double sliver = more.sliver * std::min(2.0 * radiusInCells, 1.0);
-    return 1.0 / (1.0 + penalty * (more.times * (soft + compressible) + sliver));
+    compressible_ = 0.6 * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
+    sliver_ = std::min(2.0 * radiusInCells, 1.0);
 }
 
-Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept
+double ResolvedShare::operator()(const Lacking& lacking) const noexcept
 {
-    const Window& w = windows[site.level];
-    const std::size_t n = w.layout.count, row = w.layout.row, plane = w.layout.plane;
-    const std::array<std::size_t, 8> at{0, 1, row, row + 1, plane, plane + 1, plane + row, plane + row + 1};
-    const float* x = w.field(field) + site.node;
+    const double soft = std::max(mean_ + (1.0 + 1.2 * lacking.compressible) * uneven_, 0.0);
+    const double c = lacking.times * (soft + compressible_ * lacking.compressible) + sliver_ * lacking.sliver;
+    return 1.0 / (1.0 + penalty * c);
+}
+
+Vec3 ValueAt::operator()(const ContactSite& site) noexcept
+{
+    if (site.node != node_ || site.level != level_) {
+        node_ = site.node;
+        level_ = site.level;
+        const Window& w = windows_[site.level];
+        for (std::size_t c = 0; c < nodes_.size(); ++c) {
+            nodes_[c] = w.value(field_, w.layout.corner(site.node, static_cast<int>(c)));
+        }
+    }
     Vec3 sum(0.0);
-    for (std::size_t c = 0; c < 8; ++c) {
-        sum += static_cast<double>(site.fraction[c]) * Vec3(x[at[c]], x[n + at[c]], x[2 * n + at[c]]);
+    for (std::size_t c = 0; c < nodes_.size(); ++c) {
+        sum += static_cast<double>(site.fraction[c]) * nodes_[c];
     }
     return sum;
 }

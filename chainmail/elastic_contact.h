@@ -246,7 +246,7 @@ struct Lacking {
     double sliver = 0;        // SurfacePoint::sliver
 };
 
-/// Fraction of the contact's stiffness that a point has under a patch of radius a on cells of side h.
+/// Fraction of the contact's stiffness that points have under a patch of radius a on cells of side h.
 ///
 /// Cells do not give way under a patch smaller than themselves as tissue does, least in the middle between nodes. What they
 /// lack there is a compliance c h / E per area:
@@ -260,12 +260,50 @@ struct Lacking {
 /// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance. Tissue with nu
 /// under 0.47 lacks 0.6 (0.47 - nu) h / E more, where E is 2.9 mu, and less than that under 1/4 and over 2 cells; its g, q
 /// and x are 1 + 1.2 (0.47 - nu) times as large: by the same measurements at nu 0, 0.2 and 0.35.
-/// @param radiusInCells  in cells of its window
-/// @param across  betweenNodes() of the tool
-double resolvedShare(double radiusInCells, const Between& across, const Lacking& lacking = {}) noexcept;
+class ResolvedShare {
+public:
+    /// @param radiusInCells  in cells of its window
+    /// @param across  betweenNodes() of the tool
+    ResolvedShare(double radiusInCells, const Between& across) noexcept;
+    double operator()(const Lacking& lacking) const noexcept;
 
-/// Value of a field at a site.
-Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;
+private:
+    double mean_, uneven_;          // of the compliance c: m, and what is added to it
+    double compressible_, sliver_;  // compliance per Lacking's
+};
+
+/// Value of a field at sites. Remembers the last cell: sites of one cell follow each other.
+class ValueAt {
+public:
+    ValueAt(std::span<const Window> windows, Field field) noexcept : windows_(windows), field_(field) {}
+    /// @pre  nothing but this reads the field between calls
+    Vec3 operator()(const ContactSite& site) noexcept;
+
+private:
+    std::span<const Window> windows_;
+    Field field_;
+    std::uint32_t node_ = 0;
+    std::uint32_t level_ = ~0U;
+    std::array<Vec3, 8> nodes_{};
+};
+
+/// The same at one site.
+inline Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept
+{
+    return ValueAt(windows, field)(site);
+}
+
+/// Calls visit(first, last) for sites that follow each other in one cell, last excluded.
+template <typename Visit>
+void forEachCell(std::span<const ContactSite> sites, Visit&& visit) noexcept
+{
+    for (auto first = sites.begin(); first != sites.end();) {
+        const auto last = std::find_if(
+            first + 1, sites.end(), [&](const ContactSite& s) { return s.node != first->node || s.level != first->level; });
+        visit(std::span(first, last));
+        first = last;
+    }
+}
 
 /// Shares of a cell's nodes in what is at `t` of its edges: trilinear, x fastest.
 inline std::array<float, 8> trilinear(Vec3 t) noexcept

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace palpate::chainmail {
 
@@ -34,6 +36,44 @@ Vec3 wayOf(Vec3 at, const occupancy::RoundCone& from, const occupancy::RoundCone
     const Vec3 way = to.a - from.a, before = from.b - from.a, after = to.b - to.a;
     return before == after ? way : way + turnedWay(at - from.a, glm::normalize(before), glm::normalize(after));
 }
+
+// What a tool's contacts in one window have in common.
+class Pressure {
+public:
+    Pressure(const ElasticTool& tool, const HeldTool& held, const ElasticBody& body, std::size_t level,
+             bool isSmall) noexcept
+        : isFinest_(level == 0), most_(stiffestPerArea(tool)), share_(lacksNothing, Between())
+    {
+        const auto& grid = body.levels[level].nodes;
+        const double byDepth = radiusOfPatch(tool), now = held.changed();
+        const bool knowsForce = isFinest_ && !body.relaxes;
+        const double byForce =
+            knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
+        const double deep = glm::length(tool.pushed) / tool.shape.widest();  // [radii]
+        const double small = std::min(smallTool * grid.spacing / tool.shape.widest(), 1.0);
+        lessDeep_ = isFinest_ && !isSmall ? 1.0 / (1.0 + 0.6 * small * small * deep) : 1.0;
+        confined_ = byForce > byDepth ? std::pow(byForce / byDepth, std::max(1.0 - deep, 0.0)) : 1.0;
+        share_ = ResolvedShare(byDepth > 0.0 ? byForce / grid.spacing : lacksNothing, betweenNodes(grid, tool));
+    }
+
+    // Stiffness of a site where the surface is stretched as now.
+    void spread(ContactSite& s, const Stretch& now, float sliver) const noexcept
+    {
+        const double share = share_({lessDeep_ * static_cast<double>(s.lacks), static_cast<double>(s.compressible),
+                                     isFinest_ ? static_cast<double>(sliver) : 0.0});
+        s.resolved = isFinest_ ? 1.0F : static_cast<float>(share);
+        const double bound = most_ * static_cast<double>(s.area);
+        const double atRest = std::max(s.atRest, std::min(confined_ * s.atRest, bound));
+        s.stiffness = share * now.area * std::min(now.modulus * atRest, stiffened * bound);
+    }
+
+private:
+    bool isFinest_;
+    double most_;      // stiffness per area
+    double lessDeep_;  // times what cells lack
+    double confined_;  // times the stiffness
+    ResolvedShare share_;
+};
 
 }  // namespace
 
@@ -86,11 +126,8 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     std::size_t fresh = touching_;  // the first site that is new
     if (!toolsHold) {
         pressed_.assign(held_.size(), PressedBox());
-        ++searches_;
+        keepSlips();
         for (const ContactSite& s : sites()) {
-            if (!s.isTie) {
-                slip_[s.point] = {Vec3f(s.slip), static_cast<float>(s.limit), searches_};
-            }
             if (!s.isTie && s.active() && s.owner < pressed_.size()) {
                 pressed_[s.owner].add(s.rest);
             }
@@ -108,10 +145,37 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     siteCount_ = touching_ + findTies(stack_.body(), stack_.windows(), load.ties, std::span(sites_).subspan(touching_));
     tiesFound_.assign(load.ties.begin(),
                       load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
-    for (ContactSite& s : active().subspan(fresh)) {
-        if (frictionOf(s) > 0.0 && slip_[s.point].search == searches_) {
-            s.slip = Vec3(slip_[s.point].way);
-            s.limit = static_cast<double>(slip_[s.point].limit);
+    takeSlips(active().subspan(fresh));
+}
+
+void Elastic::keepSlips() noexcept
+{
+    slips_.clear();
+    for (const ContactSite& s : sites()) {
+        if (!s.isTie && s.limit > 0.0) {
+            slips_.push_back({s.point, s.owner, Vec3f(s.rest), Vec3f(s.slip), static_cast<float>(s.limit)});
+        }
+    }
+}
+
+// Points that were held before are held as they were; a piece of a point as the piece that was nearest to it.
+void Elastic::takeSlips(std::span<ContactSite> found) noexcept
+{
+    auto first = slips_.cbegin();
+    for (ContactSite& s : found) {
+        if (frictionOf(s) <= 0.0) {
+            continue;
+        }
+        const auto of = std::pair(s.owner, s.point);
+        first = std::find_if(first, slips_.cend(), [&](const Slip& k) { return std::pair(k.owner, k.point) >= of; });
+        const auto last =
+            std::find_if(first, slips_.cend(), [&](const Slip& k) { return std::pair(k.owner, k.point) != of; });
+        const auto nearest = std::min_element(first, last, [&](const Slip& a, const Slip& b) {
+            return glm::distance(Vec3(a.rest), s.rest) < glm::distance(Vec3(b.rest), s.rest);
+        });
+        if (nearest != last) {
+            s.slip = Vec3(nearest->way);
+            s.limit = static_cast<double>(nearest->limit);
         }
     }
 }
@@ -144,47 +208,23 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 // All this is kept while a call solves, so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
-    const auto& body = stack_.body();
+    const bool isSmall = volume::isSmall(options_.law);
     StretchAt stretchAt(stack_, options_.law);
+    std::optional<Pressure> under;
     const ContactSite* before = nullptr;
-    double patch = 0.0;  // radius, in cells
-    double confined = 1.0;
-    double lessDeep = 1.0;  // of what cells lack
-    double most = 0.0;      // stiffness per area
-    Between across;         // where its middle is
     for (ContactSite& s : active()) {
         if (s.isTie) {
             continue;
         }
         if (before == nullptr || before->owner != s.owner || before->level != s.level) {
-            const ElasticTool& tool = tools_[s.owner];
-            const auto& grid = body.levels[s.level].nodes;
-            const HeldTool& held = held_[s.owner];
-            const double byDepth = radiusOfPatch(tool);
-            const bool knowsForce = s.level == 0 && !body.relaxes;
-            const double now = held.changed();
-            const double byForce =
-                knowsForce ? radiusOfPatch(tool, now * held.load, now * held.indented, now * held.onEnds) : byDepth;
-            patch = byDepth > 0.0 ? byForce / grid.spacing : lacksNothing;
-            const double deep = glm::length(tool.pushed) / tool.shape.widest();  // [radii]
-            const double small = std::min(smallTool * grid.spacing / tool.shape.widest(), 1.0);
-            lessDeep = s.level == 0 && !volume::isSmall(options_.law) ? 1.0 / (1.0 + 0.6 * small * small * deep) : 1.0;
-            confined = byForce > byDepth ? std::pow(byForce / byDepth, std::max(1.0 - deep, 0.0)) : 1.0;
-            across = betweenNodes(grid, tool);
-            most = stiffestPerArea(tool);
+            under.emplace(tools_[s.owner], held_[s.owner], stack_.body(), s.level, isSmall);
             before = &s;
         }
         // What moved last was measured then.
-        const Stretch now = volume::isSmall(options_.law) ? Stretch{}
-                            : s.stretch > 0.0             ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
-                                                          : stretchAt(s);
-        const double sliver = s.level == 0 ? static_cast<double>(body.points[s.point].sliver) : 0.0;
-        const double share = resolvedShare(
-            patch, across, {lessDeep * static_cast<double>(s.lacks), static_cast<double>(s.compressible), sliver});
-        s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
-        const double bound = most * static_cast<double>(s.area);
-        const double atRest = std::max(s.atRest, std::min(confined * s.atRest, bound));
-        s.stiffness = share * now.area * std::min(now.modulus * atRest, stiffened * bound);
+        const Stretch now = isSmall           ? Stretch{}
+                            : s.stretch > 0.0 ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
+                                              : stretchAt(s);
+        under->spread(s, now, stack_.body().points[s.point].sliver);
     }
 }
 

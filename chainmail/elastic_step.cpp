@@ -32,8 +32,9 @@ double shorter(double alpha, double slope, double change) noexcept
 // The last call's increment is the direction that the next step is made conjugate to.
 void Elastic::look() noexcept
 {
+    ValueAt increment(stack_.windows(), Field::d);
     for (ContactSite& s : active()) {
-        s.p = gather(stack_.windows(), s, Field::d);
+        s.p = increment(s);
     }
     if (!products_) {
         const auto product = stack_.dots(Field::d, Field::a, Field::e);
@@ -120,8 +121,9 @@ void Elastic::retreat() noexcept
     stack_.combine(Field::u, -1.0, Field::d, Field::u);
     stack_.combine(Field::a, -1.0, Field::e, Field::a);
     energy_ = startEnergy_;
+    ValueAt displacement(stack_.windows(), Field::u);
     for (ContactSite& s : active()) {
-        const Vec3 u = gather(stack_.windows(), s, Field::u);
+        const Vec3 u = displacement(s);
         s.slip += s.u - u;
         s.u = u;
         touch(s, shapes_, ties_);
@@ -220,9 +222,10 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
     double own = last_.tissue.curvature;
     double mixed = -product[1];
     double work = product[0];  // of the residual along z
+    ValueAt correction(stack_.windows(), Field::z);
     for (ContactSite& s : active()) {
         const Vec3 resisted = s.resist(s.p);
-        s.z = gather(stack_.windows(), s, Field::z);
+        s.z = correction(s);
         own += glm::dot(s.p, resisted);
         mixed += glm::dot(s.z, resisted);
         work += glm::dot(s.z, s.force);

@@ -21,7 +21,7 @@ constexpr double lengthRounding = 1e-6;  // of a rod, in cells
 constexpr double otherTissue = 1.25;     // times as stiff as the softest along a ring of a rod
 constexpr double endless = 1.0;          // length of a rod [m]
 constexpr double shortestRing = 0.13;    // that is halved, in the finest cells
-constexpr double givesAsFitted = 0.47;   // Poisson's ratio of the tissue that resolvedShare() is fitted to
+constexpr double givesAsFitted = 0.47;   // Poisson's ratio of the tissue that ResolvedShare is fitted to
 
 double touchedAtFirst(double radius) noexcept
 {
