@@ -153,27 +153,40 @@ struct Needle {
     }
 
     // Sideways the shaft is held by all the tissue around it. Where more of it holds, it does so from where it is: what is
-    // stored never grows by itself.
+    // stored never grows by itself. No tip gets into bone that way.
     Vec3 holdSideways(const DepthLaw& law) noexcept
     {
-        const double k = std::min(stiffestContact, law.linear * (1.0 + std::max(state.inTissue(), 0.0) / sidewaysDepth));
-        const double before = std::exchange(state.sideStiffness, k);
-        Vec3 away = tool.position - tip.proxy;
+        const double before = state.sideStiffness;
+        double k = std::min(stiffestContact, law.linear * (1.0 + std::max(state.inTissue(), 0.0) / sidewaysDepth));
+        const Vec3 away = tool.position - tip.proxy;
         Vec3 across = away - glm::dot(away, tool.axis) * tool.axis;
         if (k > before && before > 0.0) {
-            tip.proxy += (1.0 - before / k) * across;
-            across *= before / k;
+            if (moveAside((1.0 - before / k) * across)) {
+                across *= before / k;
+            } else {
+                k = before;
+            }
         }
+        state.sideStiffness = k;
         const double way = glm::length(across);
         if (way <= 0.0) {
             return Vec3(0.0);
         }
         const double limit = sidewaysLimit * row(tip.tissue).cuttingForce;
-        const double force = std::min(k * way, limit);
-        if (k * way > limit) {
-            tip.proxy += (1.0 - limit / (k * way)) * across;
-        }
+        const bool givesWay = k * way > limit && moveAside((1.0 - limit / (k * way)) * across);
+        const double force = givesWay ? limit : k * way;
         return -force / way * across;
+    }
+
+    // Moves the proxy across the needle; false where bone is there.
+    bool moveAside(Vec3 way) noexcept
+    {
+        const auto isBone = [&](Vec3 at) { return row(tissueFor(at)).role == volume::Role::bone; };
+        if (isBone(tip.proxy + way) && !isBone(tip.proxy)) {
+            return false;
+        }
+        tip.proxy += way;
+        return true;
     }
 
     // Looked at in steps, which is rare: only where the tip has been out of the body.

@@ -388,6 +388,25 @@ TEST(Needle, PathStaysCutAndTissueBesideItIsWhole)
     EXPECT_NEAR(beside.tip, first.tip, 0.02 * first.tip);
 }
 
+// A tip that is led sideways to bone stays beside it, and the force goes on growing where fat would give way.
+TEST(Needle, BoneBesideTheTipHoldsIt)
+{
+    const auto model = tests::boxOf([](Vec3 p) { return std::string(p.x > 8e-3 && p.y > 5e-3 ? "bone" : "fat"); }, "bone",
+                                    tests::chainmailOnly);
+    const auto bone = *model.tissue->table().find("bone");
+    LoneNeedle needle(model);
+    needle.go({0, -2e-3, 0}, {0, 20e-3, 0}, 0.02);
+    double most = 0.0;
+    needle.go({0, 20e-3, 0}, {7e-3, 20e-3, 0}, 0.02, [&](Vec3, Vec3 force) { most = std::max(most, std::abs(force.x)); });
+    double before = most;
+    needle.go({7e-3, 20e-3, 0}, {20e-3, 20e-3, 0}, 0.02, [&](Vec3, Vec3 force) {
+        ASSERT_NE(needle.reader.tissue(needle.tip.proxy), bone);
+        EXPECT_GT(-force.x, 0.9 * before);
+        before = -force.x;
+    });
+    EXPECT_GT(before, 1.5 * most);
+}
+
 // The ends of what is open ahead, in closed form: along a path to its end, across it to its wall, and from one into the
 // next.
 TEST(Needle, OpenLengthAheadInClosedForm)
