@@ -109,6 +109,10 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
     expectRefusal({"progress", "--group", "a=bert", "--group", "a=Smith,Jane,bert", "--group", "b=bert"},
                   "--group a=Smith,Jane,bert: bert is in this group already");
     EXPECT_EQ(palpate({"progress", "--group", "a=bert", "--group", "b=bert"}).status, 0);
+    expectRefusal({"progress", "--group", "a=bert", "--case", "layerd"},
+                  "layerd: there is no such case; did you mean layered?");
+    expectRefusal({"progress", "--group", "a=bert", "--exercise", "nosuch/x"}, "nosuch: there is no such curriculum");
+    expectRefusal({"progress", "--group", "a=bert", "--case", "layered"}, "these people have no such sessions");
     for (const char* const option : {"--case", "--exercise"}) {
         expectRefusal({"progress", "bert", option, "layered"}, std::string(option) + " requires --group");
     }
