@@ -133,7 +133,7 @@ TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
     EXPECT_EQ(there["costs"], costs);
     for (std::size_t i = 0; i < here["candidates"].size(); ++i) {
         const auto& law = here["candidates"][i]["law"];
-        EXPECT_EQ(law.is_string() ? law == "small" : here["candidates"][i]["level"] != "elastic",
+        EXPECT_EQ(law.is_string() ? law == "linear" : here["candidates"][i]["level"] != "elastic",
                   here["candidates"][i]["strain"] == "small");
         for (const auto& other : there["candidates"]) {
             const auto& c = here["candidates"][i];

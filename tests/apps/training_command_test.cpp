@@ -314,8 +314,9 @@ TEST_F(TrainingCommands, AFolderThatCannotBeMadeIsSaidInPlainWords)
 // An instructor sees who trains, and how it goes, while it goes; nothing of a session that was killed.
 TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
 {
-    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
-    Program running("palpate", {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast"});
+    const std::string anna = "anna-mit-dem-längsten-Namen";
+    ASSERT_EQ(palpate({"profile", "new", anna}).status, 0);
+    Program running("palpate", {"train", smallLayered(), "--profile", anna, "--headless", "--setting", "fast"});
     const std::string name = "train-" + std::to_string(running.pid());
     const auto listed = [&]() -> nlohmann::json {
         const auto all = figures({"sessions"});
@@ -332,7 +333,8 @@ TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
         ::usleep(100000);
     }
     ASSERT_FALSE(one.is_null());
-    EXPECT_EQ(one["who"], "anna");
+    EXPECT_EQ(one["who"], anna);
+    EXPECT_NE(palpate({"sessions"}).out.find(" anna-mit-dem-… layered "), std::string::npos) << palpate({"sessions"}).out;
     EXPECT_EQ(one["scene"], "layered");
     EXPECT_EQ(one["process"], running.pid());
     EXPECT_NE(one["state"], "outside");

@@ -165,6 +165,35 @@ TEST_P(Screens, NothingIsCutOff)
     }
 }
 
+// The field that a long name was typed into begins anew: its hint was drawn as far to the left as the name had rolled.
+TEST_P(Screens, TheHintOfANameIsWhole)
+{
+    State state = listed();
+    draw(state);
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    ImGuiID field = 0;
+    for (const ImGuiWindow* w : windows()) {
+        const ImGuiID here = ImHashStr("##name", 0, w->ID);
+        g.NavNextActivateId = here;
+        g.NavNextActivateFlags = ImGuiActivateFlags_PreferInput;
+        draw(state);
+        field = g.ActiveId == here ? here : field;
+        if (field != 0)
+            break;
+    }
+    ASSERT_NE(field, 0U);
+    ImGui::GetIO().AddInputCharactersUTF8("somebody with a name that is much too long for the field");
+    draw(state);
+    ASSERT_FALSE(state.newPerson.empty());
+    ASSERT_GT(g.InputTextState.ScrollX, 0);
+    ImGui::ClearActiveID();  // as the button does
+    draw(state);
+    state.newPerson.clear();
+    draw(state);
+    ASSERT_EQ(g.InputTextState.ID, field);
+    EXPECT_EQ(g.InputTextState.ScrollX, 0);
+}
+
 // A part that rolls shows enough of itself to be read: a heading and four lines.
 TEST_P(Screens, WhatRollsIsNoSlit)
 {
