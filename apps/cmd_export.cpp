@@ -87,7 +87,7 @@ void checkOptions(ExportArguments& o)
                  o.output.native(), o.what);
     base::failIf(!o.map.empty() && o.what != "labels", "--write-map: needs --what labels");
     if (!isVtu(o.output) && !isPng(o.output)) {
-        volume::checkExportName(o.output);
+        volume::checkExportName(o.output, o.record.empty() ? "" : "; of a record also .vtu and .png");
     }
     base::checkOutputs({o.output, volume::exportedDataOf(o.output), o.map, o.json}, {o.volume, o.record, o.like});
 }

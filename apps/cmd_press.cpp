@@ -171,11 +171,21 @@ std::string pressTable(const Run& run)
     return text + '\n';
 }
 
+// A scene may have spacing, window and cycles of its own.
+std::string settingInWords(const Run& run)
+{
+    const datasets::ModelSettings& model = run.model.scene.model;
+    const bool named = model.elastic == datasets::elasticSetting(model.setting, model.elastic);
+    const double spacing = 1e3 * run.model.lattice.grid.spacing;
+    return named ? fmt::format("setting {}, {:g} mm", model.setting, spacing)
+                 : fmt::format("setting of the scene, {:g} mm, window {}, cycles {}", spacing, model.elastic.window,
+                               model.elastic.cycles);
+}
+
 void printPress(const PressArguments& o, const Run& run)
 {
     const PressSummary& s = run.summary;
-    fmt::print("{}: {} in {}, setting {}, {:g} mm\n", o.scene, kindName(run.press.tool.kind), o.path,
-               run.model.scene.model.setting, 1e3 * run.model.lattice.grid.spacing);
+    fmt::print("{}: {} in {}, {}\n", o.scene, kindName(run.press.tool.kind), o.path, settingInWords(run));
     if (s.inContact == 0) {
         fmt::print("{} ticks; the tool never touches the tissue's surface\n", s.ticks);
         return;

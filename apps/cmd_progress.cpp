@@ -8,6 +8,8 @@
 #include <base/utc.h>
 #include <command/json.h>
 #include <report/measure_table.h>
+#include <training/case.h>
+#include <training/curriculum.h>
 #include <training/progress_page.h>
 
 #include <fmt/format.h>
@@ -88,6 +90,20 @@ void addToGroup(const ProgressArguments& o, const std::string& text, const train
         });
         group->people.push_back(std::move(p));
     }
+}
+
+// What nobody has done has to be there at least. A case may be gone that somebody has done.
+void checkFilters(const ProgressArguments& o, const training::ProfileStore& store)
+{
+    bool ofCase = o.caseId.empty(), ofExercise = o.exercise.empty();
+    for (const training::Person& person : store.people()) {
+        for (const training::StoredSession& s : store.sessions(person)) {
+            ofCase = ofCase || s.caseId == o.caseId;
+            ofExercise = ofExercise || s.curriculum + "/" + s.exercise == o.exercise;
+        }
+    }
+    ofCase ? void() : static_cast<void>(training::findCase(o.caseId));
+    ofExercise ? void() : static_cast<void>(training::findExercise(o.exercise));
 }
 
 std::vector<PeopleGroup> groupsOf(const ProgressArguments& o, const training::ProfileStore& store, Curricula& curricula)
@@ -186,6 +202,7 @@ void run(const ProgressArguments& o)
                              : base::mapped<training::Person>(o.names, [&](const auto& name) { return store.find(name); });
     const auto people =
         base::mapped<PersonProgress>(shown, [&](const auto& who) { return progressOf(store, who, asked, curricula); });
+    checkFilters(o, store);
     const std::vector<PeopleGroup> grouped = groupsOf(o, store, curricula);
     const auto groups = base::mapped<report::ScoredGroup>(grouped, scored);
     base::failIf(people.empty() && groups.empty(),

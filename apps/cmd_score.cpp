@@ -187,6 +187,7 @@ void scoreRecord(const ScoreArguments& options)
                  options.report.native());
     base::failIf(!options.pictures.empty() && (options.report.empty() || !groups.empty()),
                  "--pictures {}: needs --report of one record", options.pictures.native());
+    report::checkPictures(options.pictures);
     warn(sessions);
     // First what a file that cannot be written takes from nobody.
     if (options.json != "-") {

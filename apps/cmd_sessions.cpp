@@ -2,6 +2,7 @@
 
 #include <base/outputs.h>
 #include <base/spoken.h>
+#include <base/utf8.h>
 #include <channel/channel.h>
 #include <command/json.h>
 
@@ -118,17 +119,29 @@ std::string inMillimetres(const json& value)
     return value.is_number() ? fmt::format("{:.1f}", value.get<double>()) : "-";
 }
 
+// Shortened where it is too long for its column. A session's name is not: --session needs the whole.
+std::string inColumn(const std::string& text, std::size_t width)
+{
+    const auto letters = base::charactersOf(text);
+    std::string out;
+    for (std::size_t i = 0; i < std::min(letters.size(), width); ++i) {
+        out += i + 1 == width && letters.size() > width ? "…" : letters[i].bytes;
+    }
+    return out;
+}
+
 void printSessions(const json& all)
 {
     if (all.empty()) {
         fmt::print("no session runs\n");
         return;
     }
+    constexpr std::size_t who = 14, scene = 16;  // widths of columns
     fmt::print("{:<18} {:<14} {:<16} {:<9} {:>7} {:>9} {:>9} {:>9} {:>6} {:>5}  {}\n", "session", "who", "scene", "state",
                "time s", "inside mm", "target mm", "vital mm", "N", "cores", "warning");
     for (const json& s : all) {
         fmt::print("{:<18} {:<14} {:<16} {:<9} {:>7.1f} {:>9} {:>9} {:>9} {:>6.2f} {:>5}  {}\n",
-                   s["session"].get<std::string>(), s["who"].get<std::string>(), s["scene"].get<std::string>(),
+                   s["session"].get<std::string>(), inColumn(s["who"], who), inColumn(s["scene"], scene),
                    s["state"].get<std::string>(), s["seconds"].get<double>(), inMillimetres(s["inserted_mm"]),
                    inMillimetres(s["target_mm"]), inMillimetres(s["vital_mm"]), s["force_n"].get<double>(),
                    s["cores"].get<int>(),

@@ -5,6 +5,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/nearest.h>
+#include <base/one_line.h>
 #include <command/options.h>
 #include <studies/commands.h>
 #ifdef PALPATE_SWEEP
@@ -72,19 +73,20 @@ int main(int argc, char** argv)
     app.failure_message([](const CLI::App* program, const CLI::Error& e) {
         // CLI11 notices a missing command before a wrong word in its place.
         const auto unknown = program->remaining(true);
-        std::string what = e.what();
+        std::string what = e.what(), command = program->get_name();
+        const CLI::App* within = program;  // `palpate case`, for a word behind it
+        while (!within->get_subcommands().empty()) {
+            within = within->get_subcommands().front();
+            command += " " + within->get_name();
+        }
         if (e.get_name() == "RequiredError" && !unknown.empty()) {
-            const CLI::App* within = program;  // `palpate case`, for a word behind it
-            while (!within->get_subcommands().empty()) {
-                within = within->get_subcommands().front();
-            }
             const auto commands = palpate::base::mapped<std::string>(within->get_subcommands({}), &CLI::App::get_name);
             what = unknown[0] + ": there is no such command or option" + palpate::base::meant(unknown[0], commands);
         }
         if (what.ends_with("not expected: ")) {
             what += "\"\"; an option that takes no value has no = behind it";
         }
-        return "palpate: " + what + " (see palpate --help)\n";
+        return "palpate: " + palpate::base::oneLine(what) + " (see " + command + " --help)\n";
     });
 
     using namespace palpate;

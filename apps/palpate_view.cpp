@@ -154,12 +154,24 @@ void applyLook(const Words& words, palpate::render::ViewerOptions& options)
                                                : SliceLook::tinted;
 }
 
+// The time of --at. Beyond the record there is nothing to show.
+double momentIn(const Words& words, palpate::apps::ReplayPlayer& player)
+{
+    const double length = player.playback().length;
+    palpate::base::failIf(words.at > length + 1e-9, "{}: --at {:g}s: the record runs from 0 s to {:g} s", words.replay,
+                          words.at, length);
+    return words.at;
+}
+
 void run(Words& words, palpate::render::ViewerOptions& options)
 {
     readSize(words.size, options);
     applyLook(words, options);
     const bool tryout = options.tryout > 0 && options.title.empty();
     options.title = tryout ? palpate::render::Tryout::heading() : palpate::base::tr(options.title);
+    const auto ending = options.movie.extension();
+    palpate::base::failIf(!options.movie.empty() && ending != ".mp4" && ending != ".MP4",
+                          "{}: a film is an .mp4 file: name it so", options.movie.native());
     palpate::base::checkOutputs({words.json, words.timeline, options.movie}, {words.replay, words.ghost, options.result});
     std::optional<palpate::apps::ReplayPlayer> player;
     if (!words.replay.empty()) {
@@ -167,7 +179,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         options.session = player->session();
         options.playback = &player->playback();
         if (words.at >= 0)
-            player->startAt(options.from = words.at);
+            player->startAt(options.from = momentIn(words, *player));
         if (!words.ghost.empty())
             options.ghost = player->ghostOf(words.ghost);
     } else if (words.at >= 0 || !words.ghost.empty()) {

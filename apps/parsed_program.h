@@ -2,6 +2,7 @@
 
 #include <base/build.h>
 #include <base/inputs.h>
+#include <base/one_line.h>
 #include <command/interrupted.h>
 #include <command/options.h>
 
@@ -14,13 +15,13 @@
 
 namespace palpate::apps {
 
-/// Does the work of a program, and says what it throws in one line on standard error.
+/// Does the work of a program, and says what it throws in one line on standard error, also where a name in it has several.
 /// Returns the exit status: 0, 1 for what was thrown, 2 for arguments, 128 + signal for what a signal has ended.
 template <typename Work>
 int exitStatus(const CLI::App& app, const Work& work)
 {
     const auto say = [&](const std::string& what) {
-        std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), what.c_str());
+        std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), base::oneLine(what).c_str());
     };
     try {
         work();
@@ -48,8 +49,9 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
 {
     CLI::App app(about, name);
     app.set_version_flag("--version", std::string(base::build()));
-    app.failure_message(
-        [&](const CLI::App*, const CLI::Error& e) { return name + ": " + e.what() + " (see " + name + " --help)\n"; });
+    app.failure_message([&](const CLI::App*, const CLI::Error& e) {
+        return name + ": " + base::oneLine(e.what()) + " (see " + name + " --help)\n";
+    });
     add(app);
     command::refuseNoValues(app);
     command::failOnLargeFiles();

@@ -18,6 +18,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
                        {"windows", nlohmann::json::array()},
                        {"sweeps", elastic ? c.elastic.cycles : 0},
                        {"strain", elastic && !volume::isSmall(c.elastic.law) ? "finite" : "small"},
+                       {"law", elastic ? nlohmann::json(volume::nameOf(c.elastic.law)) : nlohmann::json()},
                        {"nodes", c.nodes},
                        {"slots", c.slots},
                        {"cycles", c.meanCycles},

@@ -1,31 +1,62 @@
 #include <render/concealment.h>
 
+#include <base/error.h>
 #include <render/events.h>
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <utility>
 
 namespace palpate::render {
 namespace {
 
-std::array<bool, channel::maxTissues> concealedRows(const Concealment& what, const channel::Scenery& scenery)
+using Rows = std::array<bool, channel::maxTissues>;
+
+Rows rowsOf(const std::string& tissue, const channel::Scenery& scenery)
 {
-    std::array<bool, channel::maxTissues> rows{};
-    std::vector<std::string> names = what.tissues;
+    constexpr std::size_t longest = channel::nameLength - 1, mark = 3;  // a scenery cuts names off, between characters
     const auto blanks = [](std::string name) {
         std::ranges::replace(name, '_', ' ');
         return name;
     };
-    std::ranges::transform(names, names.begin(), blanks);
-    for (std::size_t row = 1; row < std::min<std::size_t>(scenery.tissues, channel::maxTissues); ++row)
-        rows[row] = std::ranges::find(names, blanks(text(scenery.tissue[row].name))) != names.end();
+    const std::string asked = blanks(tissue);
+    Rows rows{};
+    for (std::size_t row = 1; row < std::min<std::size_t>(scenery.tissues, channel::maxTissues); ++row) {
+        const std::string name = blanks(text(scenery.tissue[row].name));
+        rows[row] = asked == name || (asked.size() > longest && name.size() + mark >= longest && asked.starts_with(name));
+    }
+    return rows;
+}
+
+Rows concealedRows(const Concealment& what, const channel::Scenery& scenery)
+{
+    Rows rows{};
+    for (const std::string& tissue : what.tissues)
+        std::ranges::transform(rows, rowsOf(tissue, scenery), rows.begin(), std::logical_or());
     return rows;
 }
 
 }  // namespace
+
+void checkTissues(const Concealment& what, const channel::Scenery& scenery, std::span<const std::uint8_t> labels)
+{
+    const auto isThere = [&](const std::string& tissue) {
+        return std::ranges::any_of(rowsOf(tissue, scenery), std::identity());
+    };
+    const auto unknown = std::ranges::find_if_not(what.tissues, isThere);
+    if (unknown == what.tissues.end())
+        return;
+    Rows inBody{};
+    for (const std::uint8_t label : labels)
+        inBody[label & channel::rowBits] = true;
+    std::string names;
+    for (std::size_t row = 1; row < std::min<std::size_t>(scenery.tissues, channel::maxTissues); ++row)
+        names += inBody[row] ? (names.empty() ? "" : ", ") + text(scenery.tissue[row].name) : "";
+    throw base::error("--hide {}: there is no such tissue; the body has: {}", *unknown, names);
+}
 
 void conceal(const Concealment& what, channel::Scenery& scenery)
 {

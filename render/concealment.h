@@ -18,6 +18,9 @@ struct Concealment {
     bool any() const noexcept { return plan || !tissues.empty(); }
 };
 
+/// Refuses a tissue that the scenery does not have: it would be shown in spite of the option. Throws std::runtime_error
+/// with those that `labels` have.
+void checkTissues(const Concealment& what, const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
 /// Takes the planned line out of a scenery; always out of one whose target is to be found.
 void conceal(const Concealment& what, channel::Scenery& scenery);
 /// Takes distances to the target, and what lies ahead, out of a state.

@@ -117,6 +117,7 @@ void Follower::read()
     if (known_ && now->tick == state_.tick) {
         state_.published = now->published;  // a record or a session that is paused
         state_.standing = now->standing;
+        health_.delay = 0;  // behind nothing
         return;
     }
     if (!known_ || now->tick < rateFrom_.tick)

@@ -15,7 +15,7 @@ using base::said;
 using base::spokenHere;
 using base::tr;
 
-constexpr double helpBelow = 0.84;  // of the height: title, caption and warning stand above
+constexpr double helpBelow = 0.83;  // of the height: title, caption and warning stand above
 constexpr double helpLine = 1.27;   // height of a line, in fonts
 constexpr double edge = 0.8;        // of a text from its area, in fonts
 constexpr double boxGap = 0.3;      // between boxes, in fonts
@@ -61,6 +61,10 @@ void drawTitle(Column& column, const channel::State& state, const Header& header
     column.line(title, size, white, true);
     for (const std::string& words : {all, time})
         if (column.canvas.widthOf(words, column.font, false) < room) {
+            // A needle behind the words may be as bright as they are.
+            const double wide = column.canvas.widthOf(words, column.font) + 0.8 * column.font;
+            column.canvas.rectangle({column.left + column.width + 0.4 * column.font - wide, column.y - 0.35 * column.font},
+                                    {wide, 1.4 * column.font}, cardColour, 0.75);
             column.canvas.text({column.left + column.width, column.y}, words, column.font, grey, Align::right);
             return;
         }
@@ -110,9 +114,10 @@ std::vector<Part> partsOf(const ScreenPlan& plan, const channel::Scenery& scener
     const std::string at = c.steps > 1 ? fmt::format("{}/{}  ", c.step, c.steps) : "";
     const bool told = c.step > 0 && plan.events.empty();
     const bool severe = state.status == channel::Status::faulted || state.warning == channel::Warning::touching;
-    return {{header.caption, font, cardColour, 0.75, amber, 3},
-            {told ? at + c.now : "", 1.1 * font, cardColour, 0.8, white, 1},
-            {told ? c.wrong : "", font, {0.35, 0.20, 0.02}, 0.9, {1.0, 0.88, 0.6}, 2},
+    const bool record = header.timeline >= 0;  // whose caption says whether it runs, and where it is
+    return {{header.caption, font, cardColour, 0.75, amber, record ? 1 : 3},
+            {told ? at + c.now : "", 1.1 * font, cardColour, 0.8, white, record ? 2 : 1},
+            {told ? c.wrong : "", font, {0.35, 0.20, 0.02}, 0.9, {1.0, 0.88, 0.6}, record ? 3 : 2},
             {warningWords(scenery, state), 1.35 * font, severe ? red : amber, 1, {0.05, 0.05, 0.05}, 0}};
 }
 

@@ -36,7 +36,8 @@ struct HeaderPlaces {
     double bottom = 0;  // of all of it [pixels]
 };
 
-/// Where there is no room for all, it has first the warning, then the step, what is wrong, the caption.
+/// Where there is no room for all, it has first the warning, then the step, what is wrong, the caption; of a record the
+/// caption before the step.
 HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery,
                         const channel::State& state, const Header& header);
 /// Words across the picture: "waiting for session x", "simulation ended".

@@ -222,11 +222,14 @@ void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& st
         simulation = said(tr("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed"), health.tickRate, state.tickP99 * 1e6,
                           state.missed);
     if (health.framesPerSecond > 0)
-        viewer = said(tr("{:.0f} frames/s, {:.0f} ms behind"), health.framesPerSecond, health.delay * 1e3);
+        viewer = health.delay > 0
+                     ? said(tr("{:.0f} frames/s, {:.0f} ms behind"), health.framesPerSecond, health.delay * 1e3)
+                     : said(tr("{:.0f} frames/s"), health.framesPerSecond);
     const double font = 0.9 * plan.font, x = plan.health.x + margin * plan.font;
     const double room = plan.health.width - 2 * margin * plan.font;
     const auto fits = [&](const std::string& words) { return canvas.widthOf(words, font) <= room; };
-    if (const std::string both = simulation + "   |   " + viewer; !viewer.empty() && fits(both)) {
+    const std::string both = simulation + (simulation.empty() ? "" : "   |   ") + viewer;
+    if (!viewer.empty() && fits(both)) {
         simulation = both;
         viewer.clear();
     }

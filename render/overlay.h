@@ -22,7 +22,7 @@ inline constexpr Colour basicColour{0.35, 0.65, 1.0}, additionalColour{0.75, 0.5
 /// How well viewer and simulation keep up.
 struct Health {
     double framesPerSecond = 0;
-    double delay = 0;     // from the tick to its picture [s]
+    double delay = 0;     // from the tick to its picture [s]; 0: what is shown stands still
     double tickRate = 0;  // [Hz]
 };
 

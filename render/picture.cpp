@@ -129,6 +129,7 @@ Picture::~Picture() = default;
 void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
                    std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
 {
+    checkTissues(concealed_, scenery, labels);
     close();
     result_.reset();
     channel::Scenery shown = scenery;

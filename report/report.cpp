@@ -323,6 +323,11 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
 
 }  // namespace
 
+void checkPictures(const std::filesystem::path& folder)
+{
+    folder.empty() ? void() : static_cast<void>(pngFilesIn(folder));
+}
+
 void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures,
                  const std::filesystem::path& file)
 {

@@ -6,6 +6,9 @@
 
 namespace palpate::report {
 
+/// Checks before anything is written that the folder of pictures can be read; "" is none. Throws std::runtime_error.
+void checkPictures(const std::filesystem::path& folder);
+
 /// Writes one HTML file about a session that needs nothing else and no network: outcome, score, cores, forces, distances,
 /// timing, scene and build.
 ///

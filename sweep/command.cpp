@@ -195,6 +195,20 @@ CasesWanted wantedOf(const SweepArguments& o, const SweepPlan& plan)
     return wanted;
 }
 
+// Cases that the plan does not have are refused before there is a folder of the part: a merge would take it for a shard.
+void checkPart(const SweepArguments& o, const fs::path& place)
+{
+    if (!isPart(o) || fs::exists(place / "plan.toml")) {
+        return;
+    }
+    if (!o.plan.empty()) {
+        const auto [text, origin] = planText(o.plan);
+        wantedOf(o, parsePlan(text, origin, namedScene));
+    } else if (fs::exists(fs::path(o.folder) / "plan.toml")) {
+        wantedOf(o, SweepFolder(o.folder, "", false).plan());
+    }
+}
+
 SlurmSettings merged(const SweepArguments& o, const SweepPlan& plan)
 {
     SlurmSettings s = plan.slurm;
@@ -274,6 +288,7 @@ void run(const SweepArguments& o)
     base::checkOutputs({o.json}, {o.plan});
     heedSignals();
     const fs::path place = placeOf(o);
+    checkPart(o, place);
     if (isPart(o) && o.plan.empty() && !fs::exists(place / "plan.toml") && fs::exists(fs::path(o.folder) / "plan.toml")) {
         copyPlan(o.folder, place);
     }

@@ -1,15 +1,31 @@
 #include <sweep/formula.h>
 
 #include <base/error.h>
+#include <base/nearest.h>
+#include <base/split.h>
 
 #include <muParser.h>
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
-#include <stdexcept>
+#include <ranges>
+#include <string>
+#include <vector>
 
 namespace palpate::sweep {
+
+namespace {
+
+std::vector<std::string> variablesIn(const std::map<std::string, double>& values)
+{
+    std::vector<std::string> names;
+    std::ranges::copy(values | std::views::keys, std::back_inserter(names));
+    return names;
+}
+
+}  // namespace
 
 double evaluate(const std::string& formula, const std::map<std::string, double>& values)
 {
@@ -29,7 +45,10 @@ double evaluate(const std::string& formula, const std::map<std::string, double>&
         const auto isMissing = [](const auto& used) { return std::isnan(*used.second); };
         return std::ranges::any_of(names.GetUsedVar(), isMissing) ? std::numeric_limits<double>::quiet_NaN() : value;
     } catch (const mu::Parser::exception_type& e) {
-        throw std::runtime_error("formula '" + formula + "': " + e.GetMsg());
+        const std::string token(base::trimmed(e.GetToken()));
+        base::failIf(e.GetCode() == mu::ecUNASSIGNABLE_TOKEN && isVariable(token), "formula '{}': there is no {}{}",
+                     formula, token, base::meant(token, variablesIn(values)));
+        throw base::error("formula '{}': {}", formula, e.GetMsg());
     }
 }
 

@@ -82,7 +82,7 @@ void readSteps(Section& section, DesignKind design, Axis& axis)
     }
 }
 
-void readValues(Section& section, Axis& axis)
+void readValues(Section& section, DesignKind design, Axis& axis)
 {
     const toml::array* const list = section.node("values")->as_array();
     for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
@@ -92,6 +92,13 @@ void readValues(Section& section, Axis& axis)
     const auto isNumber = [](const KeyValue& value) { return numberOf(value).has_value(); };
     section.refuseIf(std::ranges::any_of(axis.values, isNumber) && !std::ranges::all_of(axis.values, isNumber), "values",
                      "numbers and words in one list: give an axis only numbers or only words");
+    // A list has its rows as points, and samples may be drawn from one value more often.
+    for (auto value = axis.values.begin(); design == DesignKind::grid && value != axis.values.end(); ++value) {
+        section.refuseIf(std::find(axis.values.begin(), value, *value) != value, "values",
+                         fmt::format("{} is there twice: its points would be there twice too; repeats = N runs each point "
+                                     "N times",
+                                     toText(*value)));
+    }
 }
 
 Axis readAxis(Section& section, DesignKind design)
@@ -105,7 +112,7 @@ Axis readAxis(Section& section, DesignKind design)
     const int ways = (section.has("values") ? 1 : 0) + (section.has("range") ? 1 : 0) + (section.has("log_range") ? 1 : 0);
     section.missingIf(ways != 1, "values", "one of values = [..], range = [low, high], log_range = [low, high]");
     if (section.has("values")) {
-        readValues(section, axis);
+        readValues(section, design, axis);
     } else {
         axis.log = section.has("log_range");
         axis.whole = section.flag("whole").value_or(false);

@@ -1,6 +1,7 @@
 #include <sweep/run.h>
 
 #include <base/build.h>
+#include <base/counted.h>
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/split.h>
@@ -58,6 +59,13 @@ struct MergedRow {
     fs::path shard;
     SweepRow row;
 };
+
+bool hasCases(const fs::path& folder)
+{
+    const SweepFolder sweep(folder, "", false);
+    return std::ranges::any_of(std::views::iota(std::size_t{0}, sweep.plan().cases()),
+                               [&](std::size_t i) { return sweep.has(i); });
+}
 
 // Rows that the folder lacks, or has only with an error; by case.
 std::map<std::size_t, MergedRow> rowsToMerge(const SweepFolder& to, const std::vector<std::optional<SweepRow>>& there,
@@ -208,7 +216,11 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
     }
     std::sort(parts.begin(), parts.end());
     base::failIf(parts.empty(), "{}: has no shards to merge: give their folders after --merge", folder.native());
-    if (!fs::exists(folder / "plan.toml")) {
+    const bool hasPlan = fs::exists(folder / "plan.toml");
+    base::failIf(std::ranges::none_of(parts, hasCases) && !(hasPlan && hasCases(folder)),
+                 "{}: no case of its {} is done: run them, and merge again", folder.native(),
+                 base::counted(parts.size(), "shard"));
+    if (!hasPlan) {
         copyPlan(SweepFolder(parts.front(), "", false).path(), folder);
     }
     const SweepFolder to(folder, "", true);

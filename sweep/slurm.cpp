@@ -129,6 +129,13 @@ public:
             file, json{{"folder", folder_.path().string()}, {"lock", folder_.lock().id()}, {"chunks", chunks}}.dump());
         base::writeWhole(script, scriptText(file, chunks.size()));
         const Answer answer = ask({"sbatch", "--parsable", script.string()});
+        if (answer.status != 0) {
+            // The next try has names of its own.
+            std::error_code none;
+            fs::remove(file, none);
+            fs::remove(script, none);
+            fs::remove(file.parent_path(), none);  // where nothing else is in it
+        }
         base::failIf(answer.status != 0, "sbatch: {}",
                      answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.error));
         s.job = answer.text.substr(answer.text.rfind('\n') + 1);

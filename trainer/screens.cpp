@@ -64,6 +64,11 @@ Errand drawPeople(State& state)
     }
     besideIfRoom(std::string(tr("a new name")) + (roomForTwo() ? "           " : ""));
     ImGui::SetNextItemWidth((roomForTwo() ? 9 : 8) * em);
+    // How far the last name had rolled is of no use to the hint.
+    if (ImGuiInputTextState* const field = ImGui::GetInputTextState(ImGui::GetID("##name"));
+        field != nullptr && state.newPerson.empty()) {
+        field->ScrollX = 0;
+    }
     const bool typed =
         ImGui::InputTextWithHint("##name", tr("a new name"), &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
     besideIfRoom(tr("Add"));

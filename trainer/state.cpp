@@ -368,6 +368,11 @@ void sessionEnded(State& state, Result result)
     if (counts && !state.cases.empty()) {
         auto& best = state.cases[std::min(state.chosen, state.cases.size() - 1)].best;
         best = std::max(best.value_or(0), state.result.total);
+        // The list of cases takes the best from the figures of who trains, which are read again with the progress.
+        KeptSession kept;
+        kept.caseId = chosenCase(state).id;
+        kept.total = state.result.total;
+        state.progress.sessions.push_back(std::move(kept));
     }
 }
 

@@ -230,13 +230,12 @@ bool isNifti(const std::filesystem::path& file)
     return ends(name, ".nii") || ends(name, ".nii.gz");
 }
 
-void checkExportName(const std::filesystem::path& file)
+void checkExportName(const std::filesystem::path& file, std::string_view others)
 {
     static constexpr std::array<std::string_view, 5> endings{".nii", ".nii.gz", ".nrrd", ".mha", ".mhd"};
     const std::string name = lowerCase(file.filename().string());
-    if (std::none_of(endings.begin(), endings.end(), [&](std::string_view e) { return ends(name, e); })) {
-        refuse(file, "is no format that is written: name it .nii, .nii.gz, .nrrd, .seg.nrrd, .mha or .mhd");
-    }
+    refuseIf(std::none_of(endings.begin(), endings.end(), [&](std::string_view e) { return ends(name, e); }), file,
+             "is no format that is written: name it .nii, .nii.gz, .nrrd, .seg.nrrd, .mha or .mhd{}", others);
 }
 
 void checkCount(const std::filesystem::path& file, std::string_view what, std::size_t values, Index3 size)

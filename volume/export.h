@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <span>
+#include <string_view>
 
 namespace palpate::volume {
 
@@ -18,8 +19,8 @@ struct ExportOptions {
 };
 
 /// Checks that `file` ends as one of the formats that can be written: .nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd. Throws
-/// std::runtime_error that lists them.
-void checkExportName(const std::filesystem::path& file);
+/// std::runtime_error that lists them, and `others` that the caller can write.
+void checkExportName(const std::filesystem::path& file, std::string_view others = "");
 
 /// Whether `file` ends as NIfTI: .nii or .nii.gz.
 bool isNifti(const std::filesystem::path& file);

@@ -181,6 +181,8 @@ function drawRank(o) {
   const cells = (tag, values) => values.map((v) => { const e = document.createElement(tag); e.textContent = v; return e; });
   const line = (tag, values) => { const tr = document.createElement("tr"); tr.append(...cells(tag, values)); return tr; };
   byId("indices").replaceChildren(...(list.length ? [line("th", ["axis", ...s.measures]), ...list.map((e) => line("td", [e.axis, ...e.values.map(short)]))] : []));
+  byId("rank").hidden = !list.length;
+  if (!list.length) return;
   // Names have at most two fifths of the width, in several lines where they are longer; the axis has room for its labels.
   const bars = list.slice().reverse(), width = byId("rank").clientWidth;
   const labels = bars.map((e) => inLines(e.axis, 0.4 * width)), most = Math.max(1, ...labels.map((l) => l.split("\n").length));
@@ -190,7 +192,7 @@ function drawRank(o) {
     xAxis: { ...axisStyle(), type: "value", min: 0, splitNumber: Math.max(1, Math.min(5, Math.floor(width / 120))) },
     yAxis: { ...axisStyle(), type: "category", data: labels, axisLabel: { color: colour("soft"), interval: 0, lineHeight } },
     series: [{ type: "bar", data: bars.map((e) => Math.max(e.values[0] ?? 0, 0)), itemStyle: { color: colour("accent") }, barMaxWidth: 26 }],
-  }, 60 + Math.max(34, lineHeight * most + 6) * Math.max(list.length, 1));
+  }, 60 + Math.max(34, lineHeight * most + 6) * list.length);
 }
 
 function fill(id, labels, chosen) {

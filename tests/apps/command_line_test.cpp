@@ -56,7 +56,8 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
     expectRefusal({"case", "lisst"}, "lisst: there is no such command or option; did you mean list?");
     EXPECT_EQ(palpate({"case", "info", "x"}).err.find("did you mean info"), std::string::npos);
-    expectRefusal({"train", "--nosuch"}, "--nosuch");
+    expectRefusal({"train", "--nosuch"}, "--nosuch (see palpate train --help)");
+    expectRefusal({"profile", "new"}, "NAME is required (see palpate profile new --help)");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--voxels", "0"}, "--voxels");
@@ -92,6 +93,14 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"train", "nosuch"}, "layered, block, plate, pair");
     expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
     expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
+}
+
+// What is quoted may be anything: a message remains one line, and works no terminal.
+TEST(CommandLine, ANameOfSeveralLinesIsQuotedOnOne)
+{
+    expectRefusal({"score", "a\nb.db"}, "a\\nb.db: no such file");
+    expectRefusal({"train", "--case", "no\tsuch\x1b[2J"}, "no\\tsuch\\x1b[2J: there is no such case");
+    expectRefusal({"train", "--no\nsuch"}, "--no\\nsuch (see palpate train --help)");
 }
 
 TEST(CommandLine, ARecordOrALabelMapInPlaceOfASceneIsNamed)

@@ -132,6 +132,9 @@ TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
     EXPECT_EQ(here["level"], "spring");
     EXPECT_EQ(there["costs"], costs);
     for (std::size_t i = 0; i < here["candidates"].size(); ++i) {
+        const auto& named = here["candidates"][i]["law"];
+        EXPECT_EQ(named.is_string() ? named == "linear" : here["candidates"][i]["level"] != "elastic",
+                  here["candidates"][i]["strain"] == "small");
         for (const auto& other : there["candidates"]) {
             const auto& c = here["candidates"][i];
             const bool same = c["level"] == "elastic" && other["level"] == "elastic" && c["windows"] == other["windows"] &&

@@ -56,6 +56,15 @@ TEST_F(PressCommand, FiguresHaveTheTissuesForceAndTheWayOfThePoints)
     EXPECT_EQ(j.at("displacement").at(1).at("by_mm"), nlohmann::json({0.0, 0.0, 0.0}));
 }
 
+TEST_F(PressCommand, SaysWhatASceneHasOfItsOwnInPlaceOfASetting)
+{
+    EXPECT_NE(palpate({"press", scene, "--path", path, "--setting", "fast"}).out.find(", setting fast, "),
+              std::string::npos);
+    writeText(scene, readText(scene) + "[model.elastic]\nspacing_mm = 4\nwindow = 9\n");
+    const std::string out = palpate({"press", scene, "--path", path}).out;
+    EXPECT_NE(out.find(", setting of the scene, 4 mm, window 9, cycles "), std::string::npos) << out;
+}
+
 TEST_F(PressCommand, AToolSmallerThanACellIsSaidToBe)
 {
     const Outcome small = palpate({"press", scene, "--path", path, "--radius-mm", "1"});

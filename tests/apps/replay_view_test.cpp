@@ -107,6 +107,24 @@ TEST(ReplayView, ARecordThatIsStillWrittenIsShownAsFarAsItWas)
     EXPECT_EQ(session.wait().status, 130);
 }
 
+TEST(ReplayView, RefusesWhatIsNotInTheRecordAndOtherFilms)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    const auto refusal = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"--replay", threeSeconds(), "--offscreen", folder / "p", "--size", "320x320"});
+        const Outcome outcome = Program("palpate-view", more).wait();
+        EXPECT_EQ(outcome.status, 1);
+        return outcome.err;
+    };
+    EXPECT_NE(refusal({"--at", "100"}).find("--at 100s: the record runs from 0 s to 2.999 s"), std::string::npos);
+    EXPECT_NE(refusal({"--movie", folder / "film.txt"}).find("film.txt: a film is an .mp4 file"), std::string::npos);
+    const std::string hidden = refusal({"--hide", "nosuch"});
+    EXPECT_NE(hidden.find("--hide nosuch: there is no such tissue; the body has: skin, fat"), std::string::npos) << hidden;
+    EXPECT_FALSE(fs::exists(folder / "film.txt"));
+}
+
 // There is nothing between two ticks: every tick is one picture, and then it ends.
 TEST(ReplayView, WritesEveryTickOnceWhereNoTimeBetweenPicturesIsAskedFor)
 {

@@ -340,6 +340,8 @@ TEST_F(Researcher, ASceneIsProposedRunsAndItsStatesAreExported)
     const std::string vtu = readText(folder / "u.vtu");
     EXPECT_NE(vtu.find("displacement_mm"), std::string::npos);
     expectRefusal({"export", "--record", record, "--at", "900s", "-o", field}, "the record runs from 0 s to");
+    expectRefusal({"export", "--record", record, "--at", "3s", "-o", folder / "u.foo"},
+                  ".mhd; of a record also .vtu and .png");
     expectRefusal({"scene", vdb, "--target", "spleen", "-o", scene},
                   "--target spleen: the volume has no structure or tissue");
     expectRefusal({"scene", vdb, "--lesion-in", "Aorta", "--lesion", "30mm", "-o", scene}, "has no room");

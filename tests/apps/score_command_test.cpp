@@ -73,6 +73,17 @@ TEST(ScoreCommand, PrintsAlsoWhereItsFileCannotBeWritten)
     EXPECT_NE(error.find("/dev/full: "), std::string::npos) << error;
 }
 
+// A folder of pictures that is not there, before the score: nothing is written by halves.
+TEST(ScoreCommand, PrintsNothingWhereItsPicturesCannotBeRead)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.030, 2.5), none = folder / "none", page = folder / "r.html";
+    std::string printed;
+    const std::string error = tests::errorOf([&] { score({a, "--pictures", none, "--report", page}, printed); });
+    EXPECT_EQ(printed, "");
+    EXPECT_NE(error.find("none: pictures cannot be read"), std::string::npos) << error;
+}
+
 TEST(ScoreCommand, GivesEachSessionsMeasuresInTheUnitsOfTheirNames)
 {
     const synthetic::Folder folder;

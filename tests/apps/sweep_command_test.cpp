@@ -264,12 +264,29 @@ TEST_F(Sweep, RefusesWhatCannotBe)
     expectRefusal({"sweep", "--report", folder("s"), "-o", folder("s")}, "excludes --report");
     expectRefusal({"sweep", file, "--dry-run", "--shard", "1/2"}, "excludes");
     expectRefusal({"sweep", file, "-o", folder("s"), "--time", "10"}, "--slurm");
-    expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep");
+    expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep: name the folder of a sweep");
     expectRefusal({"sweep", file, "-o", "/proc/x"}, "choose another place");
     std::string air = shortPlan(1);
     air.replace(air.find("log_range = [1, 9]\nsteps = 3"), 28, "values = [0, 5]");
     expectRefusal({"sweep", plan("air.toml", air), "--dry-run"},
                   "air.toml: case 0: [tissue.fat] youngs_kpa = 0 kPa: must be 0.01 to 2e+07 kPa");
+}
+
+// What is refused leaves no folder that a merge would take for a shard, and no script that is not submitted.
+TEST_F(Sweep, WhatIsRefusedLeavesNothing)
+{
+    const std::string file = plan("p.toml", shortPlan(1));
+    for (const char* const cases : {"0-99", "12"}) {
+        expectRefusal({"sweep", file, "-o", folder("s"), "--cases", cases}, "the plan has the cases 0 to 11");
+        EXPECT_FALSE(std::filesystem::exists(folder("s")));
+    }
+    const Outcome alone = Program("/usr/bin/env", {"PATH=/none", std::filesystem::path(PALPATE_BIN_DIR) / "palpate",
+                                                   "sweep", file, "-o", folder("s"), "--slurm"})
+                              .wait();
+    EXPECT_EQ(alone.err, "palpate: sbatch: there is no Slurm here: run without --slurm\n");
+    EXPECT_FALSE(std::filesystem::exists(folder("s") + "/slurm"));
+    expectRefusal({"sweep", "-o", folder("s"), "--cases", "12"}, "the plan has the cases 0 to 11");
+    EXPECT_FALSE(std::filesystem::exists(folder("s") + "/shards"));
 }
 
 TEST_F(Sweep, TheExampleOfTheDocumentIsAPlan)

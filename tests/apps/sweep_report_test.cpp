@@ -225,6 +225,24 @@ TEST(SweepReport, BandsAndMarksAreWithinTheChart)
     }
 }
 
+// One axis that nothing follows: no chart without bars above the words for it.
+TEST(SweepReport, WithoutARankingThereIsNoChartOfIt)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    std::string text = shortPlan(1);
+    text.replace(text.find("\"force_n\", "), 11, "\"nothing = 0 * force_n\", ");
+    writeText(here / "p.toml", text);
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    figures({"sweep", "--report", here / "s"});
+    const std::string page = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile");
+    const std::string rank = partOf(page, "rank");
+    EXPECT_NE(rank.find("No ranking can be had"), std::string::npos);
+    EXPECT_EQ(rank.find("<svg"), std::string::npos);
+}
+
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.
 TEST(SweepReport, IsDrawnByABrowserFromOneFile)
 {

@@ -109,6 +109,10 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
     expectRefusal({"progress", "--group", "a=bert", "--group", "a=Smith,Jane,bert", "--group", "b=bert"},
                   "--group a=Smith,Jane,bert: bert is in this group already");
     EXPECT_EQ(palpate({"progress", "--group", "a=bert", "--group", "b=bert"}).status, 0);
+    expectRefusal({"progress", "--group", "a=bert", "--case", "layerd"},
+                  "layerd: there is no such case; did you mean layered?");
+    expectRefusal({"progress", "--group", "a=bert", "--exercise", "nosuch/x"}, "nosuch: there is no such curriculum");
+    expectRefusal({"progress", "--group", "a=bert", "--case", "layered"}, "these people have no such sessions");
     for (const char* const option : {"--case", "--exercise"}) {
         expectRefusal({"progress", "bert", option, "layered"}, std::string(option) + " requires --group");
     }
@@ -310,8 +314,9 @@ TEST_F(TrainingCommands, AFolderThatCannotBeMadeIsSaidInPlainWords)
 // An instructor sees who trains, and how it goes, while it goes; nothing of a session that was killed.
 TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
 {
-    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
-    Program running("palpate", {"train", smallLayered(), "--profile", "anna", "--headless", "--setting", "fast"});
+    const std::string anna = "anna-mit-dem-längsten-Namen";
+    ASSERT_EQ(palpate({"profile", "new", anna}).status, 0);
+    Program running("palpate", {"train", smallLayered(), "--profile", anna, "--headless", "--setting", "fast"});
     const std::string name = "train-" + std::to_string(running.pid());
     const auto listed = [&]() -> nlohmann::json {
         const auto all = figures({"sessions"});
@@ -328,7 +333,8 @@ TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
         ::usleep(100000);
     }
     ASSERT_FALSE(one.is_null());
-    EXPECT_EQ(one["who"], "anna");
+    EXPECT_EQ(one["who"], anna);
+    EXPECT_NE(palpate({"sessions"}).out.find(" anna-mit-dem-… layered "), std::string::npos) << palpate({"sessions"}).out;
     EXPECT_EQ(one["scene"], "layered");
     EXPECT_EQ(one["process"], running.pid());
     EXPECT_NE(one["state"], "outside");

@@ -2,6 +2,7 @@
 #include <render/concealment.h>
 #include <render/deformation.h>
 #include <render/events.h>
+#include <tests/error_of.h>
 #include <tests/render/body.h>
 
 #include <gtest/gtest.h>
@@ -306,6 +307,23 @@ TEST(Concealment, TheHiddenTissueBecomesWhatLiesAroundIt)
     EXPECT_TRUE(std::isinf(s.distance[0]));
     EXPECT_EQ(s.aheadTissue, 0U);
     EXPECT_EQ(scenery.entry, scenery.aim);
+}
+
+// A tissue that is misspelt would be shown. Names of over 31 bytes are cut off in a scenery.
+TEST(Concealment, ATissueThatIsNotThereIsRefused)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.tissues = 4;
+    scenery.tissue[1].name = named("fat");
+    scenery.tissue[2].name = named("a_lump_whose_name_is_so_long_in");
+    scenery.tissue[3].name = named("liver");
+    const std::vector<std::uint8_t> labels{0, 1, 1, 2};
+    for (const std::string wrong : {"nosuch", "fat,liver", "a_lump_whose_name_is_so_long_i"})
+        EXPECT_EQ(tests::errorOf([&] {
+                      checkTissues({false, {"fat", wrong}}, scenery, labels);
+                  }),
+                  "--hide " + wrong + ": there is no such tissue; the body has: fat, a_lump_whose_name_is_so_long_in");
+    EXPECT_NO_THROW(checkTissues({false, {"liver", "a lump whose name is so long indeed"}}, scenery, labels));
 }
 
 TEST(Concealment, NothingHiddenChangesNothing)

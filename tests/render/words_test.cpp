@@ -108,6 +108,43 @@ TEST_F(WordsTest, TheListOfKeysLeavesTheStepInSight)
     studio->resize(width, height);
 }
 
+// A record has stopped or runs, also while the keys are listed.
+TEST_F(WordsTest, TheListOfKeysLeavesTheCaptionOfARecordInSight)
+{
+    Picture& picture = studio->picture();
+    picture.setHelp({{"?", "shows the keys"}, {"L", "changes the layout"}});
+    picture.setSteps(true, true);
+    picture.setTimeline(0.5);
+    picture.setCaption("PAUSED   1.000 of 2.0 s");
+    for (const auto& [wide, high] : {std::pair{640, 480}, {1280, 960}}) {
+        studio->resize(wide, high);
+        for (const double t : {0.05, 1.5, 2.9}) {
+            studio->take(t, Layout::trainee, true);
+            EXPECT_GT(std::ranges::count(picture.written(), "PAUSED   1.000 of 2.0 s", &Written::words), 0)
+                << wide << ", " << t;
+        }
+    }
+    picture.setHelp({});
+    picture.setSteps(false, false);
+    picture.setTimeline(-1);
+    picture.setCaption("");
+    studio->resize(width, height);
+}
+
+// A record that stands still is behind nothing, and one that a crash has cut off has not counted its ticks.
+TEST_F(WordsTest, OfHealthAreOnlyWhatIsKnown)
+{
+    Picture& picture = studio->picture();
+    studio->take(1.0, Layout::trainee, true);
+    channel::State state = storyState(studio->scenery, 1.0);
+    state.missed = notCounted;
+    for (const auto& [delay, words] : {std::pair{0.02, "30 frames/s, 20 ms behind"}, {0.0, "30 frames/s"}}) {
+        picture.update(state, nullptr, {30, delay, 1000});
+        picture.render(Quality::still);
+        EXPECT_GT(std::ranges::count(picture.written(), words, &Written::words), 0) << words;
+    }
+}
+
 // Scale, console and the mark of the probe's side, with caption and step above them.
 TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
 {

@@ -83,6 +83,18 @@ TEST(Shards, AreMergedWithTheirRecords)
     EXPECT_EQ(mergeShards(home / "s", {}), 0U);
 }
 
+// Shards that were begun only: there would be a table without rows, and a folder that says it is this sweep.
+TEST(Shards, WithoutACaseAreNotMerged)
+{
+    const palpate::tests::Folder home;
+    makeShards(home.path(), "one");
+    for (const char* const shard : {"0", "1"})
+        std::filesystem::remove_all(home / "s/shards" / shard / "cases");
+    const std::string error = palpate::tests::errorOf([&] { mergeShards(home / "s", {}); });
+    EXPECT_NE(error.find("no case of its 2 shards is done"), std::string::npos) << error;
+    EXPECT_FALSE(std::filesystem::exists(home / "s/plan.toml"));
+}
+
 // A record that cannot be copied: its row does not come either, so that merging again brings both.
 TEST(Shards, ARowComesAfterItsRecord)
 {

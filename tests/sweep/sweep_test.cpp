@@ -174,6 +174,7 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + axis("script.2.too_mm", "[1]"), "did you mean to_mm?"},
         {scene + "nmae = \"a\"\n" + axis("dffb.gain", "[1]"), "did you mean name?"},
         {scene + axis("dffb.gain", "[]"), "expected a list"},
+        {scene + axis("dffb.gain", "[1, 0, 1]"), "1 is there twice"},
         {scene + "[[axis]]\nkey = \"dffb.gain\"\nrange = [0, 1]\n", "steps is missing"},
         {scene + "[[axis]]\nkey = \"dffb.gain\"\nrange = [1, 0]\nsteps = 3\n", "the lower one first"},
         {scene + "[[axis]]\nkey = \"dffb.gain\"\nlog_range = [0, 1]\nsteps = 3\n", "above 0"},
@@ -181,7 +182,7 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "[design]\nkind = \"sobol\"\n" + axis("dffb.gain", "[1]"), "samples is missing"},
         {scene + axis("dffb.gain", "[1]") + axis("dffb.gain", "[1]"), "is a column already"},
         {scene + "outputs = [\"hapiness\"]\n" + axis("dffb.gain", "[1]"), "there is no hapiness"},
-        {scene + "outputs = [\"a = totall / 2\"]\n" + axis("dffb.gain", "[1]"), "formula"},
+        {scene + "outputs = [\"a = totall / 2\"]\n" + axis("dffb.gain", "[1]"), "there is no totall; did you mean total?"},
         {scene + "constraints = [\"dffb_gain > \"]\n" + axis("dffb.gain", "[1]"), "formula"},
         {scene + "constraints = [\"dffb_gain > 2\"]\n" + axis("dffb.gain", "[1]"), "no point is left"},
         {scene + "constraints = [\"point < 3\"]\n" + axis("dffb.gain", "[1]"), "point"},
@@ -257,16 +258,15 @@ TEST(SweepPlan, TriesEachValueOfAListOnce)
 {
     std::string gains = "0", masses = "0.1";
     for (int i = 1; i < 61; ++i) {
-        gains += i == 7 ? ", 7" : ", 0.5";
-        masses += ", " + std::to_string(0.1 + 0.001 * i);
+        const std::string other = ", " + std::to_string(0.1 + 0.001 * i);
+        gains += i == 7 ? ", 7" : other;
+        masses += other;
     }
-    const std::string error = refusal("scene = \"block\"\n[[axis]]\nname = \"m\"\nvalues = [" + masses +
-                                      "]\n[[axis]]\nkey = \"dffb.gain\"\nvalues = [" + gains + "]\n");
+    const std::string mass = "scene = \"block\"\n[[axis]]\nname = \"m\"\nvalues = [" + masses + "]\n";
+    const std::string error = refusal(mass + "[[axis]]\nkey = \"dffb.gain\"\nvalues = [" + gains + "]\n");
     EXPECT_NE(error.find("case 7: "), std::string::npos) << error;
     EXPECT_NE(error.find("must be 0 to 1"), std::string::npos) << error;
-    EXPECT_NE(refusal("scene = \"block\"\n[[axis]]\nname = \"m\"\nvalues = [" + masses +
-                      "]\n[[axis]]\nkey = \"tissue.fatt.youngs_kpa\"\nvalues = [3]\n")
-                  .find("it has: skin, fat"),
+    EXPECT_NE(refusal(mass + "[[axis]]\nkey = \"tissue.fatt.youngs_kpa\"\nvalues = [3]\n").find("it has: skin, fat"),
               std::string::npos);
 }
 

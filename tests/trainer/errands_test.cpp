@@ -156,6 +156,29 @@ TEST(Errands, CasesAreListedAgainWhereTheyAreShown)
     EXPECT_EQ(chosenCase(state).id, "b");
 }
 
+// Of somebody as of nobody: the list is entered after the session, and its figures were read before it.
+TEST(Errands, TheBestOfASessionIsInTheListAtOnce)
+{
+    for (const char* const person : {"anna", ""}) {
+        const Folder folder;
+        makeScript(folder / "palpate", R"(for last; do :; done
+if [ $1 = train ]; then while [ $1 != --record ]; do shift; done; echo > "$2"; fi
+echo '{"cases": [{"id": "a", "title": "A", "picture": "", "difficulty": 1, "trains": [], "measures": [], "briefing": []}],
+       "score": {"total": 71, "points": {"core": 50, "vital": 21, "technique": 0}}}' > "$last")");
+        SessionFolder sink(folder / "sessions");
+        Errands errands(folder.path(), sink);
+        State state;
+        state.cases = {caseCalled("a")};
+        state.person = person;
+        errands.run(Errand::startSession, state);
+        lookUntil(errands, state, [&] { return !state.running; });
+        errands.look(state);
+        state.screen = Screen::cases;
+        EXPECT_TRUE(errands.look(state));
+        EXPECT_EQ(state.cases[0].best, 71.0) << person;
+    }
+}
+
 // Somebody who was erased in a terminal is gone from the window, from its groups and from its curve.
 TEST(Errands, WhoWasErasedElsewhereIsGone)
 {

@@ -45,7 +45,7 @@ protected:
         ImGui::DestroyContext();
     }
 
-    void draw(State& state) const
+    void draw(State& state, bool entered = true) const
     {
         constexpr int untilAllHasItsPlace = 4;
         for (int i = 0; i < untilAllHasItsPlace; ++i) {
@@ -56,7 +56,7 @@ protected:
                 [](const std::string&) {
                     return Texture{1, 640, 480};
                 },
-                width, height, i == 0);
+                width, height, entered && i == 0);
             ImGui::Render();
         }
     }
@@ -163,6 +163,36 @@ TEST_P(Screens, NothingIsCutOff)
             EXPECT_TRUE(w->Scroll.y <= 0 || state.screen == Screen::cases) << w->Name << " does not begin at its top";
         }
     }
+}
+
+// The field that a long name was typed into begins anew: its hint was drawn as far to the left as the name had rolled.
+TEST_P(Screens, TheHintOfANameIsWhole)
+{
+    State state = listed();
+    draw(state);
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    const auto go = [&] { draw(state, false); };
+    ImGuiID field = 0;
+    for (const ImGuiWindow* w : windows()) {
+        const ImGuiID here = ImHashStr("##name", 0, w->ID);
+        g.NavNextActivateId = here;
+        g.NavNextActivateFlags = ImGuiActivateFlags_PreferInput;
+        go();
+        field = g.ActiveId == here ? here : field;
+    }
+    if (field == 0) {
+        EXPECT_EQ(std::tuple(width, height), std::tuple(320, 320)) << "where it is rolled out of sight";
+        return;
+    }
+    ImGui::GetIO().AddInputCharactersUTF8("somebody with a name that is much too long for the field");
+    go();
+    ASSERT_FALSE(state.newPerson.empty());
+    ASSERT_GT(g.InputTextState.ScrollX, 0);
+    ImGui::ClearActiveID();  // as the button does
+    state.newPerson.clear();
+    go();
+    ASSERT_EQ(g.InputTextState.ID, field);
+    EXPECT_EQ(g.InputTextState.ScrollX, 0);
 }
 
 // A part that rolls shows enough of itself to be read: a heading and four lines.
