@@ -1,6 +1,7 @@
 #include <haptics/simulation.h>
 
 #include <base/error.h>
+#include <datasets/scene_text.h>
 #include <haptics/biopsy.h>
 #include <haptics/events.h>
 
@@ -27,6 +28,13 @@ constexpr double unfeltForce = 1e-3;
 double queriedLength(const datasets::ToolSpec& tool) noexcept
 {
     return tool.kind == datasets::ToolKind::needle ? shaftQueried : tool.pressedLength();
+}
+
+// A program may have changed the scene since the model was built.
+const SessionModel& checked(const SessionModel& model)
+{
+    datasets::checkScene(model.scene);
+    return model;
 }
 
 // With a cap or a period that is no positive number, the stabiliser would limit nothing.
@@ -113,7 +121,7 @@ double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& b
 }
 
 Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
-    : model_(model),
+    : model_(checked(model)),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::maxPressSeeds(model.lattice, model.scene.tool.radius)),

@@ -34,8 +34,8 @@ double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& b
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {
 public:
-    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known, and where the
-    /// scene's cap or the period is not a positive number.
+    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known or that
+    /// datasets::checkScene() refuses, and where the scene's cap or the period is not a positive number.
     explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
     Simulation(SessionModel&& model, const SimulationOptions& options = {}) = delete;  // a temporary would not outlive it
     Simulation& operator=(Simulation&&) = delete;  // its parts refer to one another: it stays where it is
