@@ -55,7 +55,7 @@ std::optional<std::pair<int, int>> pixelsOf(std::string_view text)
     const std::size_t cross = std::min(text.find('x'), text.size());
     const auto width = numberIn<int>(text.substr(0, cross));
     const auto height = numberIn<int>(text.substr(std::min(cross + 1, text.size())));
-    return width && height ? std::optional(std::pair(*width, *height)) : std::nullopt;
+    return width && height && *width > 0 && *height > 0 ? std::optional(std::pair(*width, *height)) : std::nullopt;
 }
 
 double parseShare(const std::string& option, const std::string& text)

@@ -7,13 +7,13 @@
 
 namespace palpate::base {
 
-/// "400us", "0.4ms" or "0.0004s" in seconds; nothing for anything else.
+/// "400us", "0.4ms" or "0.0004s" in seconds, also with blanks before the unit; nothing for anything else.
 std::optional<double> timeOf(std::string_view text);
 
-/// "100mm", "10cm" or "0.1m" in metres; nothing for anything else.
+/// "100mm", "10cm" or "0.1m" in metres, also with blanks before the unit; nothing for anything else.
 std::optional<double> lengthOf(std::string_view text);
 
-/// "1280x960" as width and height; nothing for anything else.
+/// "1280x960" as width and height, both over 0; nothing for anything else.
 std::optional<std::pair<int, int>> pixelsOf(std::string_view text);
 
 /// "3%" or "0.03" as a share, over 0 and under 1. Throws std::runtime_error that names the option.

@@ -58,6 +58,7 @@ concept Level = requires(L& level, const Grip& grip)
 class SpringLevel {
 public:
     explicit SpringLevel(DisplacedLattice& shape) : shape_(shape) {}
+    SpringLevel& operator=(SpringLevel&&) = delete;
     Reaction deform(const Grip& grip) noexcept;
 
 private:
@@ -69,6 +70,7 @@ class ChainMailLevel {
 public:
     /// Both must outlive it.
     ChainMailLevel(Deformation& deformation, double toolRadius);
+    ChainMailLevel& operator=(ChainMailLevel&&) = delete;
     Reaction deform(const Grip& grip) noexcept;
 
 private:
@@ -92,6 +94,7 @@ public:
     /// All must outlive it. The body's cells are the lattice's nodes.
     ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, const volume::DistanceField& surface,
                  const ElasticOptions& options, Vec3 start);
+    ElasticLevel& operator=(ElasticLevel&&) = delete;
     Reaction deform(const Grip& grip) noexcept;
     const Elastic& elastic() const noexcept { return elastic_; }
     /// Goes on from another level with the same body, whose windows are others: tissue has relaxed as far as there.

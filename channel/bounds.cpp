@@ -130,9 +130,10 @@ bool sound(const State& s, const Scenery& scenery) noexcept
     const bool places = upTo(s.tip, furthest) && upTo(s.axis, furthest) && upTo(s.bend, furthest) &&
                         upTo(s.proxy, furthest) && upTo(s.inserted, furthest) && upTo(s.aheadSpeed, strongest);
     const bool forces = upTo(s.basic, strongest) && upTo(s.additional, strongest) && upTo(s.total, strongest);
+    const std::uint32_t tissues = std::max<std::uint32_t>(scenery.tissues, 1);
     const bool rows = s.phase <= Phase::inserted && s.status <= Status::faulted && s.warning <= Warning::touching &&
-                      s.tissue < maxTissues && s.aheadTissue < maxTissues && s.refusedBy < maxTissues &&
-                      s.stoppedBy < maxTissues && s.warned < std::max<std::uint32_t>(scenery.structures, 1);
+                      s.tissue < tissues && s.aheadTissue < tissues && s.refusedBy < tissues && s.stoppedBy < tissues &&
+                      s.warned < std::max<std::uint32_t>(scenery.structures, 1);
     const bool probe =
         sound(s.probe) && s.holes <= maxHoles && std::ranges::all_of(s.hole, [](const Hole& h) { return sound(h); });
     const bool marks = std::ranges::all_of(s.mark, [](const Mark& m) { return sound(m); });

@@ -165,7 +165,8 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
                       displacements = inputs + aligned(sizeof(InputBlock));
     const std::string temporary = name + "." + std::to_string(::getpid());
     file = base::Descriptor(::shm_open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR));
-    if (!file || ::flock(*file, LOCK_SH | LOCK_NB) != 0)
+    // The mode asked for is less what the umask takes, which may be all of it.
+    if (!file || ::fchmod(*file, S_IRUSR | S_IWUSR) != 0 || ::flock(*file, LOCK_SH | LOCK_NB) != 0)
         fail(session, "cannot make shared memory", errno);
     const NameGoes goes{temporary};
     map(displacements + aligned(sizeof(DisplacedBlock)));

@@ -1,6 +1,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <datasets/approach.h>
+#include <datasets/scene_text.h>
 #include <datasets/voxel_obstacles.h>
 
 #include <fmt/format.h>
@@ -403,6 +404,7 @@ std::vector<TraineeStep> stepsInside(const Scene& scene, const Approach& approac
 
 Approach planApproach(const Scene& scene, const Tissue& tissue)
 {
+    checkScene(scene);
     if (scene.entry) {
         return {*scene.entry, aims(scene, tissue).front()};
     }

@@ -31,6 +31,10 @@ std::string ctText(const CtSpec& ct);
 void readGravity(Section& top, GravitySpec& gravity);
 std::string gravityText(const GravitySpec& gravity);
 
+/// Refuses a scene whose settings, tool or places no text may have, for scenes that a program has made or changed. Throws
+/// std::runtime_error: "block: [model.elastic] window = 0: must be 9 to 41".
+void checkScene(const Scene& scene);
+
 /// As parseScene(), of a record's text, which may name a structure several times among the target and [[vital]].
 Scene parseRecordedScene(const std::string& text, const std::filesystem::path& origin);
 

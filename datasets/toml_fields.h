@@ -1,9 +1,12 @@
 #pragma once
 
+#include <base/error.h>
 #include <datasets/toml_section.h>
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <type_traits>
 #include <variant>
 
@@ -42,6 +45,29 @@ void readFields(Section& section, std::span<const Field<T>> fields, T& target, N
             },
             f.member);
         section.missingIf(need == Need::all && !section.has(f.key), f.key, f.unit);
+    }
+}
+
+/// Refuses a number of `source` outside of the limits of its field: "PLACE window = 0: must be 9 to 41". Throws
+/// std::runtime_error.
+template <class T>
+void checkFields(std::string_view place, std::span<const Field<T>> fields, const T& source)
+{
+    constexpr double rounding = 1e-9;  // of units, relative
+    for (const Field<T>& f : fields) {
+        std::visit(
+            [&](auto member) {
+                using Value = std::remove_cvref_t<decltype(source.*member)>;
+                if constexpr (std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>) {
+                    const double value = static_cast<double>(source.*member) / f.si;
+                    const double slack = rounding * std::max(std::abs(f.low), std::abs(f.high));
+                    const std::string_view gap = f.unit.empty() ? "" : " ";
+                    base::failIf(!(value >= f.low - slack && value <= f.high + slack),
+                                 "{} {} = {:g}{}{}: must be {:g} to {:g}{}{}", place, f.key, value, gap, f.unit, f.low,
+                                 f.high, gap, f.unit);
+                }
+            },
+            f.member);
     }
 }
 

@@ -55,10 +55,10 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
     return {session, s.scenery, s.labels, s.image, s.fine};
 }
 
-void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& state) noexcept
+void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& state, double period) noexcept
 {
     state.tick = r.tick;
-    state.time = static_cast<double>(r.tick) * tickSeconds;
+    state.time = static_cast<double>(r.tick) * period;
     state.tip = triple(r.tip());
     state.axis = triple(r.device.axis);
     state.bend = triple(r.deflection);
@@ -136,7 +136,7 @@ Broadcast::Broadcast(const std::string& session, const SessionModel& model, std:
 
 void Broadcast::publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept
 {
-    showTick(record, timing, state_);
+    showTick(record, timing, state_, simulation.period());
     state_.standing = channel::Standing::no;
     publisher_.setState(state_);
     if (record.tick % channel::frameTicks == 0) {

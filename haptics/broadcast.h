@@ -20,7 +20,9 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
                                const volume::NodeGrid& display, const std::string& who = {});
 
 /// What viewers see of a tick, on top of what they have seen of those before it. Allocates nothing.
-void showTick(const TickRecord& record, const ServoTiming& timing, channel::State& state) noexcept;
+/// @param period  of the session's ticks [s]
+void showTick(const TickRecord& record, const ServoTiming& timing, channel::State& state,
+              double period = tickSeconds) noexcept;
 
 /// The displaced nodes after the last tick. Allocates nothing.
 void showShape(const Simulation& simulation, channel::Displaced& out) noexcept;

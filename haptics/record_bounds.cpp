@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string_view>
 
 namespace palpate::haptics::format {
 
@@ -86,6 +88,10 @@ void checkInfo(const SessionInfo& info)
     for (const std::string& name : info.tissues) {
         checkName("the name of a tissue", name);
     }
+    std::set<std::string_view> keys;
+    for (const auto& [key, value] : info.extra) {
+        base::failIf(!keys.insert(key).second, "extra has key '{}' twice", key);
+    }
     for (const double distance : info.warnDistances) {
         base::failIf(!(distance >= 0 && distance <= furthest), "a warning distance of {:g} m is outside 0 to {:g} m",
                      distance, furthest);
@@ -112,7 +118,7 @@ void checkTick(const TickRecord& t, const SessionInfo& info)
     for (const float seconds : t.seconds) {
         check.within("the time of a task [s]", static_cast<double>(seconds), 0, longestTask);
     }
-    for (std::uint32_t i = 0; i < t.eventCount; ++i) {
+    for (std::uint32_t i = 0; i < std::min<std::size_t>(t.eventCount, maxEventsPerTick); ++i) {
         check.optionalRow("structure of an event", t.events[i].structure, structures);
         check.row("tissue of an event", t.events[i].tissue, tissues);
     }

@@ -69,6 +69,7 @@ std::string SessionInfo::extraOf(std::string_view key) const
 
 struct Recorder::Impl {
     std::string file;
+    SessionInfo info;
     std::filesystem::path place;  // absolute: the working directory may change
     FileId written;               // the file that was made there
     boost::lockfree::spsc_queue<TickRecord> ring;
@@ -91,8 +92,9 @@ struct Recorder::Impl {
     std::optional<Clock::time_point> lockedSince;  // by another program
 
     // The ring holds eight seconds at the session's rate, and never less than eight at 1 kHz.
-    Impl(const std::string& path, const SessionInfo& info)
+    Impl(const std::string& path, const SessionInfo& of)
         : file(path),
+          info(of),
           ring(static_cast<std::size_t>(std::clamp(8 * info.rate, 8192.0, 65536.0))),
           syncEvery(static_cast<std::uint64_t>(5 * info.rate))
     {
@@ -185,6 +187,31 @@ struct Recorder::Impl {
         }
     }
 
+    // Empty, or why no Record would hand this tick out.
+    std::string whyUnreadable(const TickRecord& tick) const
+    {
+        try {
+            format::checkTick(tick, info);
+            return {};
+        } catch (const std::runtime_error& e) {
+            return e.what();
+        }
+    }
+
+    // Writes the next tick. False where there is none, or where it is unreadable.
+    bool writeNext(std::string& unreadable)
+    {
+        bool written = false;
+        ring.consume_one([&](const TickRecord& tick) {
+            unreadable = whyUnreadable(tick);
+            if (unreadable.empty()) {
+                writer->write(tick);
+                written = true;
+            }
+        });
+        return written;
+    }
+
     // Returns what went wrong, or nothing.
     std::string store(const std::optional<Results>& toFinish, bool last, bool awaited) noexcept
     {
@@ -199,12 +226,16 @@ struct Recorder::Impl {
                 if (!begin(awaited)) {
                     return {};
                 }
-                while (taken < ticksPerTransaction && ring.consume_one([&](const TickRecord& r) {
-                    writer->write(r);
+                std::string unreadable;
+                while (taken < ticksPerTransaction && writeNext(unreadable)) {
                     ++taken;
-                })) {
                 }
                 database->execute("COMMIT");
+                if (!unreadable.empty()) {
+                    taken = 0;
+                    ++lost;
+                    throw std::runtime_error(unreadable);
+                }
                 syncAfter(taken);
             } while (taken == ticksPerTransaction);
             taken = 0;

@@ -60,12 +60,14 @@ struct Seal {
 class Recorder {
 public:
     /// Throws std::runtime_error when the file cannot be made or its name is taken, and for a session that no record holds:
-    /// a rate outside 100 Hz to 20 kHz, more structures or tissues than there may be, names of over 200 bytes.
+    /// a rate outside 100 Hz to 20 kHz, more structures or tissues than there may be, names of over 200 bytes, a key of
+    /// `extra` that is there twice.
     Recorder(const std::filesystem::path& file, const SessionInfo& info);
     /// Writes what is left, marks the session complete and leaves one plain file, as finish() does.
     ~Recorder();
 
-    /// From one thread. Wait-free, allocates nothing; a full ring counts a lost record.
+    /// From one thread. Wait-free, allocates nothing; a full ring counts a lost record. A tick that no Record would read,
+    /// as one with a tip beyond 10 m, ends the record before it, and error() says why.
     void push(const TickRecord& record) noexcept;
     /// Waits until everything pushed so far is in the file. For sessions that run faster than real time, so that the ring
     /// does not fill; never from a real-time loop.

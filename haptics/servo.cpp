@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <ctime>
 
@@ -19,15 +20,19 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
-constexpr auto period = 1ms;
 constexpr auto spin = 50us;   // what a sleep may come late without harm
 constexpr int priority = 60;  // above everything ordinary, below the kernel's own threads
 
-constexpr int longestStale = 50;  // ticks: the watchdog has faded the force to zero by then
+constexpr double longestStale = 0.05;  // [s]: the watchdog has faded the force to zero by then
 
 double seconds(Clock::duration d) noexcept
 {
     return std::chrono::duration<double>(d).count();
+}
+
+Clock::duration durationOf(double seconds) noexcept
+{
+    return std::chrono::nanoseconds(std::llround(1e9 * seconds));
 }
 
 void sleepUntil(Clock::time_point due) noexcept
@@ -125,7 +130,7 @@ public:
         faded_ = fading_ ? faded_ + 1 : 0;
         return faded_ >= PauseHooks::fadeTicks && glm::length(record.total) < 1e-9;
     }
-    void stand(Device& device, Vec3 place, const std::atomic<bool>& stop, ServoTiming& timing)
+    void stand(Device& device, Vec3 place, Clock::duration period, const std::atomic<bool>& stop, ServoTiming& timing)
     {
         const auto since = Clock::now();
         auto due = since + period;
@@ -164,10 +169,12 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
     Punctuality periods(timing);
     Overload overload(options.lateAllowed);
     Pause pause(options.pause, options.paced);
+    const Clock::duration period = durationOf(simulation.period());
+    const int mostStale = static_cast<int>(std::lround(longestStale / simulation.period()));
     auto due = Clock::now() + period;
     int stale = 0;  // ticks that the force still fades, after a gap
     while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
-        if (options.seconds > 0.0 && static_cast<double>(timing.ticks) * tickSeconds >= options.seconds) {
+        if (options.seconds > 0.0 && static_cast<double>(timing.ticks) * simulation.period() >= options.seconds) {
             break;
         }
         if (options.paced) {
@@ -188,14 +195,14 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
         }
         sink(record, timing);
         if (pause.reached(record)) {
-            pause.stand(device, record.device.position, stop, timing);
+            pause.stand(device, record.device.position, period, stop, timing);
             due = Clock::now() + period;
         }
         const auto now = Clock::now();
         while (options.paced && now > due + period) {
             due += period;
             periods.add(true);
-            stale = std::min(stale + 1, longestStale);
+            stale = std::min(stale + 1, mostStale);
         }
     }
     device.write(Vec3(0.0));

@@ -25,7 +25,7 @@ struct PauseHooks {
 
 /// How a loop keeps time and when it ends.
 struct ServoOptions {
-    bool paced = true;   // one tick per millisecond; false: as fast as it goes, for batches
+    bool paced = true;   // one tick per period of the simulation; false: as fast as it goes, for batches
     double seconds = 0;  // end after this much session time; 0 = when the device has finished
     /// Paced: asks for a cheaper model when more than this many of the last thousand ticks were late; 0 = never. A gap, in
     /// which the computer did something else, is one late tick, however long it was.
@@ -36,10 +36,10 @@ struct ServoOptions {
 /// Called after every tick, in the servo thread: must not allocate, lock or block.
 using TickSink = std::function<void(const TickRecord&, const ServoTiming&)>;
 
-/// The 1 kHz loop: H2, the simulation's tasks, H5, then `sink`. Runs in the calling thread until the device has finished,
-/// the time is over or `stop` is set. Sleeps until 50 us before a tick is due and spins the rest. After a gap it goes on
-/// from where it is: the ticks in between are counted as missed, never made up in a burst, and for as many ticks the
-/// samples are marked stale, so that the stabiliser's watchdog fades the force.
+/// The loop, at 1 kHz unless the simulation has another period: H2, the simulation's tasks, H5, then `sink`. Runs in the
+/// calling thread until the device has finished, the time is over or `stop` is set. Sleeps until 50 us before a tick is due
+/// and spins the rest. After a gap it goes on from where it is: the ticks in between are counted as missed, never made up
+/// in a burst, and for as many ticks the samples are marked stale, so that the stabiliser's watchdog fades the force.
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
                      const std::atomic<bool>& stop);
 

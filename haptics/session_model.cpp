@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <chainmail/deformation.h>
 #include <chainmail/loose_pieces.h>
+#include <datasets/scene_text.h>
 #include <haptics/posed.h>
 #include <haptics/probe_placement.h>
 
@@ -163,6 +164,7 @@ datasets::Approach approachIfAny(datasets::Scene& scene, const Posed& posture, c
 
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession)
 {
+    datasets::checkScene(scene);
     base::failIf(!tissue, "{}: a model needs the scene's volume, and there is none", scene.name);
     base::failIf(tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures,
                  "{}: at most {} tissues and {} vital structures are supported", scene.name, maxTissues, maxStructures - 1);

@@ -37,7 +37,8 @@ struct SessionModel {
 };
 
 /// Builds fields and lattice; puts the volume into the scene's posture first, which takes seconds. Throws
-/// std::runtime_error for structures that the volume does not have, and more of them than maxStructures.
+/// std::runtime_error for structures that the volume does not have, more of them than maxStructures, and what
+/// datasets::checkScene() refuses.
 /// @param scene      what to build
 /// @param tissue     its volume
 /// @param isSession  a session needs a way to the target, and may step down to ChainMail: a tool that holds too many nodes

@@ -1,5 +1,7 @@
 #include <haptics/simulation.h>
 
+#include <base/error.h>
+#include <datasets/scene_text.h>
 #include <haptics/biopsy.h>
 #include <haptics/events.h>
 
@@ -26,6 +28,23 @@ constexpr double unfeltForce = 1e-3;
 double queriedLength(const datasets::ToolSpec& tool) noexcept
 {
     return tool.kind == datasets::ToolKind::needle ? shaftQueried : tool.pressedLength();
+}
+
+// A program may have changed the scene since the model was built.
+const SessionModel& checked(const SessionModel& model)
+{
+    datasets::checkScene(model.scene);
+    return model;
+}
+
+// With a cap or a period that is no positive number, the stabiliser would limit nothing.
+StabiliserOptions optionsOf(const SessionModel& model, const SimulationOptions& options)
+{
+    const double cap = model.scene.forceCap;
+    const auto isPositive = [](double value) { return value > 0.0 && std::isfinite(value); };
+    base::failIf(!isPositive(cap), "scene {}: a force cap of {} N: must be a positive number", model.scene.name, cap);
+    base::failIf(!isPositive(options.period), "a period of {} s between ticks: must be a positive number", options.period);
+    return {options.device ? *options.device : deviceParameters(model.scene.device), options.period, cap};
 }
 
 // Stops the time of one task after the other.
@@ -102,7 +121,7 @@ double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& b
 }
 
 Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
-    : model_(model),
+    : model_(checked(model)),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::maxPressSeeds(model.lattice, model.scene.tool.radius)),
@@ -112,8 +131,7 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
       body_(deformation_.shape().body(model.surface)),
       contacts_(std::make_unique<occupancy::ContactSet>()),
       probe_(model.scene.probe),
-      stabiliserOptions_{options.device ? *options.device : deviceParameters(model.scene.device), options.period,
-                         model.scene.forceCap}
+      stabiliserOptions_(optionsOf(model, options))
 {
     // Until there is a pose, the tool is outside: before the planned line, farther away than the body is wide.
     const volume::Box body = model.tissue->box();

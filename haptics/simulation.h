@@ -34,9 +34,11 @@ double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& b
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {
 public:
-    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known.
+    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known or that
+    /// datasets::checkScene() refuses, and where the scene's cap or the period is not a positive number.
     explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
     Simulation(SessionModel&& model, const SimulationOptions& options = {}) = delete;  // a temporary would not outlive it
+    Simulation& operator=(Simulation&&) = delete;  // its parts refer to one another: it stays where it is
 
     /// H3 collide, H4 basic force, deform, H6 monitor, H7 additional force, stabilise. H2 and H5 are the servo loop's.
     const TickRecord& tick(const DeviceSample& device) noexcept;
@@ -49,6 +51,8 @@ public:
     datasets::ModelLevel level() const noexcept { return level_; }
     /// How often it stepped down: elastic, elastic on small windows, chainmail, spring.
     int stepsDown() const noexcept { return stepsDown_; }
+    /// Between samples [s].
+    double period() const noexcept { return stabiliserOptions_.period; }
     /// That it was made of.
     const SessionModel& model() const noexcept { return model_; }
 

@@ -40,6 +40,21 @@ bool finite(Vec3 v) noexcept
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+// Whether cap and period are such that they limit a force.
+bool isLimiting(const StabiliserOptions& o) noexcept
+{
+    return o.cap >= 0.0 && o.device.peakForce >= 0.0 && o.period > 0.0 && std::isfinite(o.period);
+}
+
+// Nothing is sent from now on.
+SentForce endInFault(StabiliserState& s) noexcept
+{
+    s.faulted = true;
+    s.sent = {};
+    s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = {};
+    return {Vec3(0.0), Vec3(0.0), true};
+}
+
 // From the moment of a sample to the middle of the force that answers it.
 double lateness(const StabiliserOptions& o) noexcept
 {
@@ -280,6 +295,9 @@ Motion motionIn(const MotionWindow& w, double encoder, double period) noexcept
 SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec3 read, const StabiliserOptions& o,
                     StabiliserState& s) noexcept
 {
+    if (!isLimiting(o)) {
+        return endInFault(s);
+    }
     const double readWay = s.started ? glm::distance(read, s.read) : 0.0;
     s.read = read;
     s.faulted = s.faulted || !finite(basic) || !finite(additional) || (device.buttons & poseInvalid) != 0;
@@ -325,6 +343,9 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         const bool falls =
             device.fresh && glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
         sent = towards(s.sent, sent, falls ? maxFall(way, readWay, motion, slew, limits.stiffness, o) : slew, cap);
+    }
+    if (!finite(sent.total())) {
+        return endInFault(s);
     }
     s.sent = sent;
     s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;

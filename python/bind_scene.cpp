@@ -226,6 +226,7 @@ void bindModel(py::module_& module)
                                    auto box = std::make_unique<VolumeBox>();
                                    box->tissue = m.model.tissue;
                                    box->file = fileOf(m);
+                                   box->dense = m.dense;
                                    return box;
                                })
         .def_property_readonly("structures", [](const Modelled& modelled) { return modelled.info.structures; })

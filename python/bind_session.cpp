@@ -3,6 +3,7 @@
 #include <python/tick_rows.h>
 
 #include <base/error.h>
+#include <haptics/record_bounds.h>
 #include <session/devices.h>
 #include <session/figures.h>
 #include <volume/direction.h>
@@ -393,6 +394,18 @@ void bindConstants(py::module_& module)
     module.attr("TICK_SECONDS") = haptics::tickSeconds;
 }
 
+// As a recorder does, also where there is none: whoever adds a record finds the same names good.
+void checkOperator(const std::string& name)
+{
+    haptics::SessionInfo info;
+    info.operatorName = name;
+    try {
+        haptics::format::checkInfo(info);
+    } catch (const std::runtime_error& e) {
+        throw py::value_error(std::string("operator: ") + e.what());
+    }
+}
+
 }  // namespace
 
 void bindSession(py::module_& module)
@@ -406,6 +419,7 @@ void bindSession(py::module_& module)
                  const std::string file = record.is_none() ? "" : pathOf(record, "record").string();
                  refuseIf(file.empty() && !record.is_none(), "record: is empty: give a file, or None for no record");
                  const std::string name = wordOf(operatorName, "operator");
+                 checkOperator(name);
                  return std::make_unique<SessionBox>(modelOf(scene), file, name);
              }),
              py::arg("scene"), py::arg("record") = py::none(), py::arg("operator") = "")

@@ -254,7 +254,8 @@ py::array gridView(const py::object& self, const py::dtype& type, const void* da
 py::object imageOf(const py::object& self)
 {
     auto& box = self.cast<VolumeBox&>();
-    return box.tissue->hasImage() ? py::object(gridView(self, py::dtype::of<float>(), box.image().data())) : py::none();
+    return box.tissue->hasImage() ? py::object(gridView(self, py::dtype::of<float>(), box.dense->image(*box.tissue).data()))
+                                  : py::none();
 }
 
 py::dict provenanceOf(const VolumeBox& box)
@@ -316,27 +317,27 @@ std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const
 
 }  // namespace
 
-const std::vector<std::uint16_t>& VolumeBox::labels()
+const std::vector<std::uint16_t>& DenseGrids::labels(const volume::Tissue& tissue)
 {
     const std::lock_guard lock(making_);
     if (!labels_) {
-        labels_ = tissue->labels().values;
+        labels_ = tissue.labels().values;
     }
     return *labels_;
 }
 
-const std::vector<float>& VolumeBox::stiffness()
+const std::vector<float>& DenseGrids::stiffness(const volume::Tissue& tissue)
 {
     const std::lock_guard lock(making_);
     if (!stiffness_) {
-        const Index3 size = tissue->size();
+        const Index3 size = tissue.size();
         volume::LabelImage at;
         at.size = size;
         std::vector<float> values(at.offset({0, 0, size.z}));
         tbb::parallel_for(0, size.z, [&](int z) {
-            const volume::Tissue::Reader reader(*tissue);
+            const volume::Tissue::Reader reader(tissue);
             volume::forEachIndex({0, 0, z}, {size.x - 1, size.y - 1, z}, [&](Index3 n) {
-                values[at.offset(n)] = static_cast<float>(reader.youngsModulus(tissue->affine().toPatient(Vec3(n))));
+                values[at.offset(n)] = static_cast<float>(reader.youngsModulus(tissue.affine().toPatient(Vec3(n))));
             });
         });
         stiffness_ = std::move(values);
@@ -344,11 +345,11 @@ const std::vector<float>& VolumeBox::stiffness()
     return *stiffness_;
 }
 
-const std::vector<float>& VolumeBox::image()
+const std::vector<float>& DenseGrids::image(const volume::Tissue& tissue)
 {
     const std::lock_guard lock(making_);
     if (!image_) {
-        auto companion = tissue->companion();
+        auto companion = tissue.companion();
         image_ = companion ? std::move(companion->values) : std::vector<float>();
     }
     return *image_;
@@ -382,13 +383,14 @@ void bindVolume(py::module_& module)
             py::arg("file"))
         .def_property_readonly("labels",
                                [](const py::object& self) {
+                                   const auto& box = self.cast<VolumeBox&>();
                                    return gridView(self, py::dtype::of<std::uint16_t>(),
-                                                   self.cast<VolumeBox&>().labels().data());
+                                                   box.dense->labels(*box.tissue).data());
                                })
         .def_property_readonly("stiffness",
                                [](const py::object& self) {
-                                   return gridView(self, py::dtype::of<float>(),
-                                                   self.cast<VolumeBox&>().stiffness().data());
+                                   const auto& box = self.cast<VolumeBox&>();
+                                   return gridView(self, py::dtype::of<float>(), box.dense->stiffness(*box.tissue).data());
                                })
         .def_property_readonly("image", &imageOf)
         .def_property_readonly("image_unit", [](const VolumeBox& box) { return box.tissue->imageUnit(); })

@@ -129,7 +129,7 @@ void LiveSession::heed(const haptics::TickRecord& tick)
         events_.emplace_back(tick.tick, tick.events[i]);
     }
     if (tick.fired) {
-        haptics::showTick(tick, {}, cores_);
+        haptics::showTick(tick, {}, cores_, session_.simulation().period());
     }
     last_ = tick;
     axis_ = tick.device.axis;
@@ -141,7 +141,7 @@ channel::State LiveSession::shown() const noexcept
     channel::State state = cores_;
     haptics::TickRecord tick = last_;
     tick.fired = false;  // its core is in cores_
-    haptics::showTick(tick, {}, state);
+    haptics::showTick(tick, {}, state, session_.simulation().period());
     return state;
 }
 

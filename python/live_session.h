@@ -8,6 +8,7 @@
 #include <haptics/recorder.h>
 #include <haptics/scenery.h>
 #include <haptics/simulation.h>
+#include <python/dense_grids.h>
 #include <session/session.h>
 #include <ultrasound/placement.h>
 #include <ultrasound/scanner.h>
@@ -67,6 +68,7 @@ struct Modelled {
     haptics::SessionInfo info;
     std::shared_ptr<const volume::Tissue> given;  // the scene's volume, before gravity; null: not loaded
     bool inMemory = false;                        // its volume is in no file, so that a record could not be replayed
+    std::shared_ptr<DenseGrids> dense = std::make_shared<DenseGrids>();  // of model.tissue
 };
 
 /// One session. Its methods may be called from any thread, from one at a time.

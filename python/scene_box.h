@@ -4,32 +4,23 @@
 
 #include <datasets/scene.h>
 #include <python/convert.h>
+#include <python/dense_grids.h>
 #include <python/live_session.h>
 #include <volume/tissue.h>
 
 #include <filesystem>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace palpate::python {
 
-/// A volume and dense copies of its grids, which are made when first asked for; all views look into those.
+/// A volume and the dense copies of its grids.
 struct VolumeBox {
     std::shared_ptr<const volume::Tissue> tissue;
     std::filesystem::path file;  // that it was read from or saved to; empty: it is in memory alone
-
-    const std::vector<std::uint16_t>& labels();
-    const std::vector<float>& stiffness();  // [Pa]
-    const std::vector<float>& image();      // empty: none
-
-private:
-    std::mutex making_;
-    std::optional<std::vector<std::uint16_t>> labels_;
-    std::optional<std::vector<float>> stiffness_, image_;
+    std::shared_ptr<DenseGrids> dense = std::make_shared<DenseGrids>();
 };
 
 /// A scene, and what its text came from.

@@ -130,7 +130,7 @@ ShownState shownState(const std::string& file, double at, std::optional<std::uin
     recompute(
         record, simulation, file, tick,
         [&](const haptics::TickRecord& now) {
-            haptics::showTick(now, timing, shown.state);
+            haptics::showTick(now, timing, shown.state, simulation.period());
             if (now.tick == shape) {
                 haptics::showShape(simulation, *shown.shape);
                 shown.shape->tick = shape;

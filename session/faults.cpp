@@ -236,7 +236,7 @@ void FaultsAround::work(const Faults& faults, const std::filesystem::path& recor
         if (!full && any(FaultKind::diskFull, tick)) {
             full.emplace(record);
         }
-        if (any(FaultKind::stallViewer, tick) != stalled) {
+        if (stall_ && any(FaultKind::stallViewer, tick) != stalled) {
             stalled = !stalled;
             stall_(stalled);
         }

@@ -69,7 +69,8 @@ private:
 class FaultsAround {
 public:
     /// @param faults  those of other kinds count for nothing
-    /// @param record  the file that cannot grow    @param stall  stops (true) or lets go on (false) the viewers
+    /// @param record  the file that cannot grow
+    /// @param stall   stops (true) or lets go on (false) the viewers; empty: there are none
     FaultsAround(Faults faults, std::filesystem::path record, std::function<void(bool)> stall);
     ~FaultsAround();
 

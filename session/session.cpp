@@ -1,8 +1,12 @@
 #include <session/session.h>
 
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace palpate::session {
 
@@ -11,8 +15,19 @@ using namespace haptics;
 constexpr std::size_t maxCores = 64;
 constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
 
+namespace {
+
+double periodOf(const SessionInfo& info)
+{
+    base::failIf(!(info.rate > 0.0 && std::isfinite(info.rate)), "session: a rate of {} Hz: must be a positive number",
+                 info.rate);
+    return 1.0 / info.rate;
+}
+
+}  // namespace
+
 Session::Session(const SessionModel& model, const SessionInfo& info)
-    : simulation_(model, {1.0 / info.rate, {}}), info_(info), watch_(info)
+    : simulation_(model, {periodOf(info), {}}), info_(info), watch_(info)
 {
     figures_.cores.reserve(maxCores);
     figures_.nearest.fill(std::numeric_limits<double>::infinity());

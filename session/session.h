@@ -48,9 +48,11 @@ class Session {
 public:
     /// @param model  must outlive the session
     /// @param info   of this model, see describeSession(): what the score goes by, and the rate of its ticks
-    /// Throws std::runtime_error for a scene with a device that is not known.
+    /// Throws std::runtime_error for a scene with a device that is not known, and where the rate or the scene's cap is not
+    /// a positive number.
     Session(const haptics::SessionModel& model, const haptics::SessionInfo& info);
     Session(haptics::SessionModel&&, const haptics::SessionInfo&) = delete;  // a temporary would not outlive it
+    Session& operator=(Session&&) = delete;  // is neither copied nor moved: std::deque and std::unique_ptr hold several
 
     /// One tick, a millisecond unless `info` has another rate: the pose of the tool in, forces and events out. The same
     /// poses give the same ticks, bit for bit.

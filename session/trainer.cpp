@@ -1,6 +1,7 @@
 #include <session/trainer.h>
 
 #include <base/end_in_order.h>
+#include <base/error.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
 #include <haptics/interrupted.h>
@@ -57,7 +58,7 @@ void showProgress(const channel::State& s)
 }
 
 // What there is to do outside the loop while it runs. The progress is read as a viewer reads it.
-void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
+void waitFor(const TrainOptions& options, const std::atomic<bool>& done, EndInOrder& untilItsEnd)
 {
     const bool terminal = isatty(STDERR_FILENO) != 0;
     const auto viewer = channel::Subscriber::attach(options.session);
@@ -68,7 +69,7 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
             showProgress(*state);
         }
         if (options.lookAfter && !options.lookAfter()) {
-            EndInOrder::asked() = true;
+            untilItsEnd.end();
         }
     }
     if (terminal) {
@@ -111,11 +112,21 @@ std::vector<std::pair<std::string, std::string>> resultsOf(const TrainResult& re
             {"score_total", fmt::format("{:.1f}", result.score.total)}};
 }
 
+const TrainOptions& checked(const TrainOptions& options, const SessionInfo& info)
+{
+    base::failIf(info.rate != 1.0 / tickSeconds, "session {}: a rate of {} Hz: hands and faults keep {:g} Hz",
+                 options.session, info.rate, 1.0 / tickSeconds);
+    base::failIf(has(options.faults, FaultKind::stallViewer) && !options.stallViewers,
+                 "session {}: fault stall-viewer: there is nothing that stops viewers (TrainOptions::stallViewers)",
+                 options.session);
+    return options;
+}
+
 }  // namespace
 
 struct Trainer::Impl {
     Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
-        : options(o),
+        : options(checked(o, info)),
           broadcast(o.session, model, handOf(deviceKind(o.device.name)), info.operatorName),
           device(openWithFaults(o, model, broadcast)),
           session(model, info)
@@ -129,29 +140,29 @@ struct Trainer::Impl {
     }
 
     // The servo thread: nothing in the sink allocates, locks or does I/O.
-    void servo(std::vector<std::string>& warnings)
+    void servo(std::vector<std::string>& warnings, EndInOrder& untilItsEnd)
     {
         if (options.servo.paced) {
             warnings = claimRealTime();
         }
-        options.servo.pause.asked = [this] {
+        options.servo.pause.asked = [this, &untilItsEnd] {
             const auto input = broadcast.input();
             if (input && input->ended != 0 && deviceKind(options.device.name).somebodyHolds) {
-                EndInOrder::asked() = true;
+                untilItsEnd.end();
             }
             return input && input->paused != 0;
         };
-        options.servo.pause.standing = [this](bool elsewhere) {
+        options.servo.pause.standing = [this, &untilItsEnd](bool elsewhere) {
             broadcast.stand(elsewhere ? channel::Standing::toolElsewhere : channel::Standing::paused);
             if (broadcast.torn()) {
-                EndInOrder::asked() = true;
+                untilItsEnd.end();
             }
         };
-        const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &EndInOrder::asked()};
-        timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {
+        const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &untilItsEnd.wanted()};
+        timing = session.run(*device, run, [&](const TickRecord& record, const ServoTiming& soFar) {
             broadcast.publish(record, soFar, session.simulation());
             if (broadcast.torn()) {
-                EndInOrder::asked() = true;
+                untilItsEnd.end();
             }
             if (around) {
                 around->tell(record.tick);
@@ -204,6 +215,7 @@ struct Trainer::Impl {
     ServoTiming timing;
     std::optional<Recorder> recorder;
     std::optional<FaultsAround> around;
+    bool hasRun = false;
 };
 
 Trainer::Trainer(const SessionModel& model, const SessionInfo& info, const TrainOptions& options)
@@ -215,18 +227,20 @@ Trainer::~Trainer() = default;
 
 TrainResult Trainer::run()
 {
-    const EndInOrder untilItsEnd;
+    base::failIf(std::exchange(impl_->hasRun, true), "session {}: has run already: another needs a Trainer of its own",
+                 impl_->options.session);
+    EndInOrder untilItsEnd;
     std::vector<std::string> warnings;
     std::atomic<bool> done{false};
     std::thread servo([&] {
-        impl_->servo(warnings);
+        impl_->servo(warnings, untilItsEnd);
         done = true;
     });
     if (isatty(STDERR_FILENO) != 0 || impl_->options.lookAfter) {
         try {
-            waitFor(impl_->options, done);
+            waitFor(impl_->options, done, untilItsEnd);
         } catch (...) {
-            EndInOrder::asked() = true;
+            untilItsEnd.end();
             servo.join();
             throw;
         }
@@ -243,7 +257,7 @@ TrainResult Trainer::run()
     }
     result.timing = std::move(impl_->timing);
     result.warnings = warnings;
-    result.signal = EndInOrder::signal();
+    result.signal = untilItsEnd.interruptedBy();
     result.restart = impl_->wantsAnew();
     impl_->conclude(result);
     // The record is closed before a disk that is full on purpose has room again.

@@ -15,6 +15,7 @@
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <map>
@@ -240,8 +241,18 @@ void checkExportName(const std::filesystem::path& file, std::string_view others)
 
 void checkCount(const std::filesystem::path& file, std::string_view what, std::size_t values, Index3 size)
 {
+    refuseIf(size.x < 1 || size.y < 1 || size.z < 1, file, "a grid of {} x {} x {} is empty", size.x, size.y, size.z);
     refuseIf(values != base::countOf(size), file, "{} of {} values do not fit a grid of {} x {} x {}", what, values, size.x,
              size.y, size.z);
+}
+
+// No reader gets a place from a voxel whose directions are dependent.
+void checkHasVolume(const std::filesystem::path& file, const Affine& affine)
+{
+    const Vec3 s = affine.spacing();
+    const double volume = affine.voxelVolume();
+    refuseIf(!std::isfinite(volume) || !(volume > 1e-6 * s.x * s.y * s.z), file,
+             "its voxels have no volume, or numbers that are not finite: check the affine");
 }
 
 void exportLabels(const std::filesystem::path& file, const LabelImage& image, std::span<const LabelName> names,
@@ -249,6 +260,7 @@ void exportLabels(const std::filesystem::path& file, const LabelImage& image, st
 {
     checkExportName(file);
     checkCount(file, "labels", image.values.size(), image.size);
+    checkHasVolume(file, image.affine);
     const std::vector<ExportedSegment> segments = segmentsOf(image, names);
     const bool small = segments.empty() || segments.back().label.value < 256;
     VoxelStream voxels{{image.size, image.affine}, small ? Component::u8 : Component::u16, 1, {}};
@@ -270,6 +282,7 @@ void exportImage(const std::filesystem::path& file, const VoxelGrid& grid, std::
 {
     refuseSegmentation(file);
     checkCount(file, "an image", values.size(), grid.size);
+    checkHasVolume(file, grid.affine);
     const auto slice = static_cast<std::size_t>(grid.size.x) * static_cast<std::size_t>(grid.size.y);
     VoxelStream voxels{grid, Component::f32, 1, {}};
     voxels.slice = [&](int z, int, std::vector<std::byte>& out) {
@@ -283,6 +296,7 @@ void exportVectors(const std::filesystem::path& file, const VoxelGrid& grid, std
 {
     refuseSegmentation(file);
     checkCount(file, "vectors", values.size(), grid.size);
+    checkHasVolume(file, grid.affine);
     const auto slice = static_cast<std::size_t>(grid.size.x) * static_cast<std::size_t>(grid.size.y);
     VoxelStream voxels{grid, Component::f32, 3, {}};
     voxels.slice = [&](int z, int c, std::vector<std::byte>& out) {

@@ -42,7 +42,7 @@ std::filesystem::path exportedDataOf(const std::filesystem::path& file);
 /// @param names    of labels; those of value 0 and of labels that no voxel has are left out
 /// @param options  version of NIfTI, and who hears how far it is
 /// Throws std::runtime_error ("FILE: what is wrong and what to do"), as the other three do where there is not one value for
-/// each place of the grid.
+/// each place of the grid, or where that is empty; for voxels without a volume as the next two do.
 void exportLabels(const std::filesystem::path& file, const LabelImage& image, std::span<const LabelName> names,
                   const ExportOptions& options = {});
 

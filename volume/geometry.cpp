@@ -1,5 +1,7 @@
 #include <volume/geometry.h>
 
+#include <base/error.h>
+
 #include <glm/matrix.hpp>
 
 #include <cmath>
@@ -30,6 +32,9 @@ NodeGrid coveringGrid(const Box& box, double spacing, double margin)
 
 double affordableSpacing(const Box& box, double wanted, double margin, std::size_t maxNodes)
 {
+    constexpr std::size_t fewest = 8;  // two along each axis, however far apart
+    base::failIf(!(wanted > 0.0) || !std::isfinite(wanted), "a spacing of {} m: must be a positive number", wanted);
+    base::failIf(maxNodes < fewest, "a grid of at most {} nodes: it has at least {}", maxNodes, fewest);
     double spacing = wanted;
     while (coveringGrid(box, spacing, margin).count() > maxNodes) {
         spacing *= 1.02;
@@ -39,8 +44,15 @@ double affordableSpacing(const Box& box, double wanted, double margin, std::size
 
 NodeGrid affordableGrid(const Box& box, double wanted, std::size_t maxNodes)
 {
-    const double spacing = affordableSpacing(box, wanted, 2.0 * wanted, maxNodes);
-    return coveringGrid(box, spacing, 2.0 * spacing);
+    constexpr std::size_t fewest = 216;  // six along each axis, with two spacings on both sides
+    base::failIf(maxNodes < fewest, "a grid of at most {} nodes: it has at least {}", maxNodes, fewest);
+    double spacing = affordableSpacing(box, wanted, 2.0 * wanted, maxNodes);
+    NodeGrid grid = coveringGrid(box, spacing, 2.0 * spacing);
+    while (grid.count() > maxNodes) {
+        spacing *= 1.02;
+        grid = coveringGrid(box, spacing, 2.0 * spacing);
+    }
+    return grid;
 }
 
 }  // namespace palpate::volume

@@ -1,5 +1,6 @@
 #include <volume/resample.h>
 
+#include <base/error.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
@@ -426,13 +427,25 @@ VoxelGrid isotropicGrid(const VoxelGrid& of, double spacing)
     return grid;
 }
 
+namespace {
+
+void checkValues(std::size_t values, Index3 size)
+{
+    base::failIf(values != base::countOf(size), "{} values do not fit a grid of {} x {} x {}", values, size.x, size.y,
+                 size.z);
+}
+
+}  // namespace
+
 ResampledLabels resampled(const LabelImage& image, const VoxelGrid& grid, const std::function<void(double)>& progress)
 {
+    checkValues(image.values.size(), image.size);
     return Resampling(image, grid, progress).run();
 }
 
 std::vector<float> resampledImage(const VoxelGrid& of, std::span<const float> values, const VoxelGrid& grid, float outside)
 {
+    checkValues(values.size(), of.size);
     const Mat3 toIndex = glm::inverse(of.affine.linear);
     const Mat3 step = toIndex * grid.affine.linear;
     const Vec3 start = toIndex * (grid.affine.origin - of.affine.origin);

@@ -49,11 +49,13 @@ struct ResampledLabels {
 /// the new voxels therefore has gaps, but its volume. Others give what they have over nine tenths of their volume. Who has
 /// no voxel takes one of any structure with more than one; if there is none in the voxels that it is in, one beside that
 /// which it fills most of. A structure is lost only where all of these are the only ones of others.
+/// Throws std::runtime_error where there is not one value for each voxel.
 /// @param progress  called with the share done, from 0 to 1, from one thread; may be empty
 ResampledLabels resampled(const LabelImage& image, const VoxelGrid& grid, const std::function<void(double)>& progress = {});
 
 /// Trilinear values of an image on another grid, `outside` where that reaches beyond its voxels (count x 1).
 /// @param values  on `of`, x fastest
+/// Throws std::runtime_error where there is not one for each voxel.
 std::vector<float> resampledImage(const VoxelGrid& of, std::span<const float> values, const VoxelGrid& grid, float outside);
 
 }  // namespace palpate::volume

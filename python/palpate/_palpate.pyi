@@ -107,7 +107,8 @@ class Volume:
         """Writes a .vdb, and no other name, whole, or leaves what was there. Raises palpate.Error."""
     @property
     def labels(self) -> NDArray[np.uint16]:
-        """(i, j, k), read-only. The dense array is made once, when first asked for; further views share it and keep it alive."""
+        """(i, j, k), read-only. The dense array is made once, when first asked for; further views share it and keep it alive,
+        also those of Model.volume."""
     @property
     def stiffness(self) -> NDArray[np.float32]:
         """Young's modulus [Pa], (i, j, k), read-only, as labels; 0 outside."""
@@ -309,7 +310,9 @@ class Session:
             fresh: False says that the device had no new pose.
 
         Raises:
-            ValueError: the pose is none, or buttons or fresh as run() refuses them. palpate.Error: the session is closed, or at work in another thread.
+            ValueError: the pose has not so many numbers, or buttons or fresh as run() refuses them. Numbers that are no pose
+                (NaN, beyond 10 m) raise nothing: they switch the force off, as a broken device would, and event "fault"
+                says so. palpate.Error: the session is closed, or at work in another thread.
         """
     def run(self, poses: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = ...) -> NDArray[np.void]:
         """A tick for each pose; the GIL is released. The same poses give the same bits as step() and `palpate replay`.

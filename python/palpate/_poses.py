@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from ._palpate import TICK_SECONDS
 
 
+_MOST_TICKS = 10_000_000  # nearly three hours; 240 MB
+
+
 def _numbers(value: ArrayLike, name: str, shape: tuple[int, ...], wanted: str) -> NDArray[np.float64]:
     if np.ma.isMaskedArray(value):
         raise ValueError(f"{name}: is a masked array: give a plain one, such as its filled()")
@@ -39,7 +42,7 @@ def press_path(
         n x 3 positions [m], float64.
 
     Raises:
-        ValueError: what is given is no point, direction or number, or out of range.
+        ValueError: what is given is no point, direction or number, or out of range, or the path has over 10 million ticks.
     """
     start = _numbers(start, "start", (3,), "three numbers, in metres")
     direction = _numbers(direction, "direction", (3,), "three numbers")
@@ -58,6 +61,12 @@ def press_path(
     if not (speed > 0 and depth >= 0 and hold >= 0 and lead >= 0):
         raise ValueError("press_path: speed has to be above 0, and depth, hold and lead not below 0")
     step = speed * TICK_SECONDS
+    ticks = 600 + hold / TICK_SECONDS + (2 * (depth + lead) / step if step > 0 else math.inf)
+    if ticks > _MOST_TICKS:
+        raise ValueError(
+            f"press_path: the path would have {ticks:.3g} ticks, and {_MOST_TICKS:.3g} are the most: raise speed, or lower "
+            "depth, hold or lead"
+        )
     steps = math.ceil((depth + lead) / step - 1e-6)  # the last one may be shorter; 1e-6: rounding makes none of its own
     down = np.append(-lead + step * np.arange(steps), depth)
     way = np.concatenate([np.full(600, -lead), down, np.full(round(hold / TICK_SECONDS), depth), down[::-1]])

@@ -1,10 +1,13 @@
 #include <base/quantities.h>
+#include <base/rank_correlation.h>
 #include <base/round_step.h>
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -33,9 +36,18 @@ TEST(PixelsOf, TakesWidthAndHeightAlone)
 {
     EXPECT_EQ(pixelsOf("1280x960"), std::pair(1280, 960));
     for (const char* const wrong : {"", "x", "1280", "1280x", "x960", "1280x960 ", " 1280x960", "1280 x960", "1280x960x3",
-                                    "1280X960", "1e3x960", "99999999999x960"}) {
+                                    "1280X960", "1e3x960", "99999999999x960", "-1x5", "0x0", "5x-1"}) {
         EXPECT_FALSE(pixelsOf(wrong)) << wrong;
     }
+}
+
+TEST(RankCorrelation, OfWhatHasNoRanksIsNone)
+{
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::vector<double> whole{1, 2, 3, 4}, holed{1, 2, nan, 4}, shorter{1, 2};
+    EXPECT_TRUE(std::isnan(rankCorrelation(whole, holed)));
+    EXPECT_TRUE(std::isnan(rankCorrelation(holed, whole)));
+    EXPECT_THROW(rankCorrelation(whole, shorter), std::runtime_error);
 }
 
 }  // namespace

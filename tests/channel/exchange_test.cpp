@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <csignal>
@@ -39,6 +40,19 @@ TEST(Exchange, ALateViewerGetsSceneryLabelsAndTheLastState)
     EXPECT_EQ(displaced->tick, 40U);
     EXPECT_TRUE(whole(*displaced));
     EXPECT_FALSE(subscriber->displaced(*displaced)) << "nothing newer";
+}
+
+TEST(Exchange, OnlyItsUserMayReadASegmentWhateverTheUmask)
+{
+    for (const mode_t mask : {0777U, 0022U, 0U}) {
+        const std::string session = sessionNamed("umask");
+        const mode_t before = ::umask(mask);
+        const Publisher publisher(session, smallScenery(), smallLabels());
+        ::umask(before);
+        struct stat status {};
+        ASSERT_EQ(::stat((std::string(segmentFolder) + segmentName(session)).c_str(), &status), 0);
+        EXPECT_EQ(status.st_mode & 0777U, 0600U) << mask;
+    }
 }
 
 TEST(Exchange, NothingIsThereBeforeTheFirstTick)

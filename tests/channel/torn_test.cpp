@@ -109,6 +109,8 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
         [](State& s) { s.warning = static_cast<Warning>(9); },
         [](State& s) { s.warned = 1; },
         [](State& s) { s.tissue = 64; },
+        [](State& s) { s.tissue = 2; },  // the scenery has two
+        [](State& s) { s.stoppedBy = 2; },
         [](State& s) { s.aheadTissue = 0xFFFFFFFF; },
         [](State& s) { s.distance[3] = nan; },
         [](State& s) { s.probe.face[0] = nan; },

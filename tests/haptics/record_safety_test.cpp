@@ -53,6 +53,42 @@ void expectRefusal(const std::filesystem::path& file, const std::string& words, 
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
 }
 
+// What the reader refuses is not written: the record ends before it, and can be read.
+TEST(RecordSafety, ATickThatNobodyWouldReadEndsTheRecordBeforeIt)
+{
+    const synthetic::Folder folder;
+    TickRecord tick;
+    tick.device.position = {10.5, 0, 0};
+    TickRecord elsewhere;
+    elsewhere.tissue = 5;
+    for (const TickRecord& bad : {tick, elsewhere}) {
+        const auto file = folder / (bad.tissue == 0 ? "far" : "row");
+        Recorder recorder(file, synthetic::info());
+        for (std::uint64_t i = 0; i < 5; ++i) {
+            TickRecord next = i == 3 ? bad : TickRecord{};
+            next.tick = i;
+            recorder.push(next);
+        }
+        recorder.finish({});
+        expectRefusal(file, "recording stopped: tick 3: ", recorder.error());
+        EXPECT_FALSE(recorder.whole());
+        EXPECT_EQ(recorder.lost(), 2U);
+        const Record record(file);
+        std::uint64_t ticks = 0;
+        record.each([&](const TickRecord&) { ++ticks; });
+        EXPECT_EQ(ticks, 3U);
+    }
+}
+
+TEST(RecordSafety, AKeyThatIsThereTwiceIsRefused)
+{
+    const synthetic::Folder folder;
+    SessionInfo info = synthetic::info();
+    info.extra = {{"note", "first"}, {"note", "second"}};
+    expectRefusal(folder / "a", "extra has key 'note' twice", tests::errorOf([&] { Recorder(folder / "a", info); }));
+    EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+}
+
 // After a crash nearly all of a record is in its log. Whoever moves the record alone must not lose the log to the next one.
 TEST(RecordSafety, TheNameOfARecordThatLeftItsLogThereIsRefused)
 {

@@ -17,8 +17,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <stdexcept>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace palpate::haptics {
@@ -111,6 +114,43 @@ TEST(Servo, GapsAndOverrunsAreCounted)
     device.tick = 0;
     Simulation again(model);
     EXPECT_GE(runServo(device, again, {false, 0.0}, sink, stop).overruns, 3U);
+}
+
+// Its parts refer to one another: a moved one wrote to memory that was gone.
+static_assert(!std::is_move_constructible_v<Simulation> && !std::is_copy_constructible_v<Simulation>);
+static_assert(!std::is_move_assignable_v<Simulation> && !std::is_copy_assignable_v<Simulation>);
+static_assert(!std::is_move_constructible_v<chainmail::SpringLevel>);
+static_assert(!std::is_move_constructible_v<chainmail::ChainMailLevel>);
+static_assert(!std::is_move_constructible_v<chainmail::ElasticLevel>);
+
+TEST(Servo, ACapOrAPeriodThatIsNoPositiveNumberIsRefused)
+{
+    SessionModel model = tests::blockSphere();
+    const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+    for (const double bad : {nan, infinite, 0.0, -1e-3}) {
+        EXPECT_THROW(Simulation(model, {bad, {}}), std::runtime_error) << bad;
+        model.scene.forceCap = bad;
+        EXPECT_THROW(Simulation{model}, std::runtime_error) << bad;
+        model.scene.forceCap = 8.5;
+    }
+}
+
+// At 500 Hz as at 1 kHz, for the loop and for viewers.
+TEST(Servo, SecondsAreThoseOfTheSimulation)
+{
+    for (const double rate : {500.0, 1000.0, 4000.0}) {
+        Simulation simulation(tests::blockSphere(), {1.0 / rate, {}});
+        HandDevice hand({}, waitFor(100), {0, -7e-3, 0}, {0, 1, 0});
+        std::atomic<bool> stop{false};
+        channel::State state;
+        const auto sink = [&](const TickRecord& r, const ServoTiming& t) { showTick(r, t, state, simulation.period()); };
+        EXPECT_NEAR(static_cast<double>(runServo(hand, simulation, {false, 0.1}, sink, stop).ticks), 0.1 * rate, 1.0);
+        EXPECT_NEAR(state.time, 0.1, 2.0 / rate);
+        // A paced loop takes no less than its time.
+        const auto start = std::chrono::steady_clock::now();
+        runServo(hand, simulation, {true, 0.1}, sink, stop);
+        EXPECT_GE(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 0.099);
+    }
 }
 
 // Faster than real time there is no clock to miss.

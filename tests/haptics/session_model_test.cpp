@@ -1,11 +1,17 @@
 #include "models.h"
 
 #include <datasets/tables.h>
+#include <haptics/simulation.h>
+#include <tests/error_of.h>
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <limits>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::haptics {
@@ -37,6 +43,34 @@ TEST(SessionModel, AnAimInTheAirIsRefused)
         FAIL() << "no error";
     } catch (const std::runtime_error& error) {
         EXPECT_STREQ(error.what(), "block: [target] aim_mm = [0, -5, 0] lies outside the body");
+    }
+}
+
+// What a program sets is held to what a scene's text may say; each of these never ended, or ended the process.
+TEST(SessionModel, ASceneThatNoTextMayHaveIsRefused)
+{
+    using Scene = datasets::Scene;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::vector<std::pair<const char*, std::function<void(Scene&)>>> all{
+        {"[model.elastic] spacing_mm = 0 mm: must be 0.2 to 20 mm", [](Scene& s) { s.model.elastic.spacing = 0; }},
+        {"[model.elastic] spacing_mm = nan mm", [=](Scene& s) { s.model.elastic.spacing = nan; }},
+        {"[model] spacing_mm = 0 mm", [](Scene& s) { s.model.spacing = 0; }},
+        {"[model.elastic] window = 0: must be 9 to 41", [](Scene& s) { s.model.elastic.window = 0; }},
+        {"[model.elastic] window = 10: must be odd", [](Scene& s) { s.model.elastic.window = 10; }},
+        {"[model.elastic] cycles = 0: must be 1 to 100", [](Scene& s) { s.model.elastic.cycles = 0; }},
+        {"[target] entry_mm = [nan, 0, 0]", [=](Scene& s) { s.entry = Vec3(nan, 0, 0); }},
+        {"[tool] radius_mm = 0 mm: must be over 0 mm", [](Scene& s) { s.tool.radius = 0; }},
+        {"[tool] radius_mm = nan mm", [=](Scene& s) { s.tool.radius = nan; }}};
+    const Scene good = datasets::parseScene(tests::sphereOnBlock("structure = \"fat\"\n"), "test.toml");
+    const auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(good));
+    SessionModel model = buildModel(good, tissue);
+    for (const auto& [words, change] : all) {
+        Scene bad = good;
+        change(bad);
+        const std::string why = tests::errorOf([&] { buildModel(bad, tissue); });
+        EXPECT_TRUE(why.starts_with("block: " + std::string(words))) << why;
+        model.scene = bad;
+        EXPECT_THROW(Simulation{model}, std::runtime_error) << words;
     }
 }
 

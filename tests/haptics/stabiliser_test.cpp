@@ -177,6 +177,43 @@ TEST(Stabiliser, NonFiniteForceIsNeverSentAndLatches)
     }
 }
 
+// Each of these let the force through, or made it no number.
+TEST(Stabiliser, WithoutALimitNothingIsSent)
+{
+    const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+    std::vector<StabiliserOptions> options;
+    for (const double cap : {nan, -1.0, -1e-9, -infinite}) {
+        options.push_back({premium.device, premium.period, cap});
+    }
+    for (const double period : {nan, 0.0, -1e-3, infinite}) {
+        options.push_back({premium.device, period, premium.cap});
+    }
+    for (const StabiliserOptions& o : options) {
+        StabiliserState state;
+        for (int i = 0; i < 100; ++i) {
+            const SentForce sent = stabilise(Vec3(200, 0, 0), Vec3(0.0), heldAt({-1e-4 * i, 0, 0}), o, state);
+            ASSERT_EQ(sent.total(), Vec3(0.0)) << o.cap << " N, " << o.period << " s";
+            ASSERT_TRUE(sent.faulted);
+        }
+    }
+}
+
+// Of a device whose parameters are no numbers: what came in was finite.
+TEST(Stabiliser, ASumThatIsNotFiniteIsNeverSent)
+{
+    for (const auto parameter : {&DeviceParameters::mass, &DeviceParameters::viscous, &DeviceParameters::coulomb}) {
+        StabiliserOptions o = premium;
+        o.device.*parameter = std::numeric_limits<double>::quiet_NaN();
+        StabiliserState state;
+        SentForce sent;
+        for (int i = 0; i < 100; ++i) {
+            sent = stabilise(Vec3(-1 - 0.1 * i, 0, 0), Vec3(0.0), heldAt({1e-4 * i, 0, 0}), o, state);
+            ASSERT_TRUE(std::isfinite(glm::length(sent.total())));
+        }
+        EXPECT_TRUE(sent.faulted);
+    }
+}
+
 // With an ideal device the ledger is the work of its motors, to the last bit of rounding, whole periods of delay or none.
 TEST(Stabiliser, LedgerIsTheWorkOfTheMotors)
 {

@@ -99,6 +99,22 @@ class Run(InFolder):
                 with self.subTest(name, wrong=wrong), self.assertRaisesRegex(ValueError, "finite"):
                     palpate.press_path((0, 0, 0), (0, 1, 0), 1e-3, **{name: wrong})
 
+    def test_a_path_that_no_memory_holds_is_refused(self):
+        for name, wrong in [("speed", 1e-9), ("speed", 5e-324), ("hold", 1e9), ("lead", 1e9), ("depth", 1e300)]:
+            arguments = {"depth": 1e-3, name: wrong}
+            with self.subTest(arguments), self.assertRaisesRegex(ValueError, "^press_path: the path would have .* ticks"):
+                palpate.press_path((0, 0, 0), (0, 1, 0), **arguments)
+
+    def test_an_operator_that_no_record_takes_is_refused_without_one_too(self):
+        for wrong in "two\nlines", "x" * 201:
+            with self.subTest(wrong), self.assertRaisesRegex(ValueError, "^operator: the operator has "):
+                palpate.Session(small_block(), operator=wrong)
+
+    def test_views_of_a_models_volume_share_one_array(self):
+        model = palpate.Model(small_block())
+        self.assertTrue(np.shares_memory(model.volume.labels, model.volume.labels))
+        self.assertTrue(np.shares_memory(model.volume.stiffness, model.volume.stiffness))
+
     def test_a_path_of_what_is_no_point_is_refused(self):
         for name in ("start", "direction"):
             for wrong in ([1], [1, 2], [[0, 1, 0]], np.zeros((3, 1)), 1.0, None, "abc", np.zeros(3, complex), [1, [2], 3]):

@@ -2,14 +2,22 @@
 
 #include <session/devices.h>
 #include <session/open.h>
+#include <session/trainer.h>
 
 #include <gtest/gtest.h>
 
 #include <tests/allocations.h>
 
+#include <unistd.h>
+
 #include <atomic>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <string>
+#include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace palpate::session {
@@ -109,6 +117,63 @@ TEST_F(SessionTest, FiguresTellOfAFault)
     pose.position.x = std::bit_cast<double>(0x7ff8000000000000);
     EXPECT_EQ(session.tick(pose).total, Vec3(0.0));
     EXPECT_TRUE(session.figures().faulted);
+}
+
+static_assert(!std::is_move_constructible_v<Session> && !std::is_copy_constructible_v<Session>);
+static_assert(!std::is_move_assignable_v<Session> && !std::is_copy_assignable_v<Session>);
+
+TEST_F(SessionTest, ARateThatIsNoPositiveNumberIsRefused)
+{
+    haptics::SessionInfo bad = info();
+    for (const double rate : {0.0, -1000.0, std::numeric_limits<double>::infinity(), std::nan("")}) {
+        bad.rate = rate;
+        EXPECT_THROW(Session(model(), bad), std::runtime_error) << rate;
+    }
+}
+
+// A session whose ticks come slowly, so that there is time beside it.
+TrainOptions slowly(const std::string& name)
+{
+    TrainOptions options;
+    options.session = name + std::to_string(getpid());
+    options.servo.paced = false;
+    for (int i = 1; i < 500; ++i) {
+        options.faults.push_back({FaultKind::gap, 0, 20e-3, 20e-3 * i});
+    }
+    return options;
+}
+
+// Its own lookAfter, and no other's, ends a session.
+TEST_F(SessionTest, TwoTrainersEndEachByItself)
+{
+    TrainOptions first = slowly("first"), second = slowly("second");
+    std::atomic<bool> hasEnded{false};
+    first.lookAfter = [] { return false; };
+    int since = 0;
+    second.lookAfter = [&] { return !hasEnded || ++since < 3; };
+    Trainer one(model(), info(), first), other(model(), info(), second);
+    std::thread beside([&] {
+        one.run();
+        hasEnded = true;
+    });
+    const TrainResult result = other.run();
+    beside.join();
+    EXPECT_GE(since, 3);
+    EXPECT_EQ(result.signal, 0);
+    EXPECT_EQ(result.problem, "");
+    EXPECT_THROW(other.run(), std::runtime_error) << "a second time, without its record";
+}
+
+TEST_F(SessionTest, ATrainerRefusesWhatItCannotDo)
+{
+    TrainOptions options = slowly("refused");
+    haptics::SessionInfo slower = info();
+    slower.rate = 500;
+    EXPECT_THROW(Trainer(model(), slower, options), std::runtime_error);
+    options.faults = parseFaults("stall-viewer=100ms@0.2s");
+    EXPECT_THROW(Trainer(model(), info(), options), std::runtime_error);
+    options.stallViewers = [](bool) {};
+    EXPECT_NO_THROW(Trainer(model(), info(), options));
 }
 
 TEST_F(SessionTest, ATickAllocatesNothing)

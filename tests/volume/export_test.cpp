@@ -311,5 +311,22 @@ TEST(Export, RefusesValuesThatDoNotFitTheGrid)
     exportVtu(folder / "whole.vtu", nodes, tissue, u);
 }
 
+TEST(Export, RefusesGridsWithoutVolume)
+{
+    const tests::Folder folder;
+    LabelImage empty, flat;
+    flat.size = {2, 2, 2};
+    flat.values.assign(8, 1);
+    flat.affine.linear = Mat3(0.0);
+    for (const char* const name : {"a.nii", "a.nrrd", "a.mha"}) {
+        for (const LabelImage& image : {empty, flat}) {
+            const std::string why = tests::errorOf([&] { exportLabels(folder / name, image, {}); });
+            EXPECT_TRUE(why.starts_with((folder / name).string() + ": ")) << why;
+            EXPECT_FALSE(std::filesystem::exists(folder / name));
+        }
+    }
+    EXPECT_THROW(exportImage(folder / "a.nii", {flat.size, flat.affine}, std::vector<float>(8)), std::runtime_error);
+}
+
 }  // namespace
 }  // namespace palpate::volume

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <stdexcept>
+#include <vector>
 
 namespace palpate::volume {
 namespace {
@@ -266,6 +268,17 @@ TEST(ResampleImage, ALinearImageStaysExact)
     });
     EXPECT_GT(inside, 1000U);
     EXPECT_GT(outside, 300U);
+}
+
+TEST(Resample, RefusesValuesThatDoNotFitTheGrid)
+{
+    LabelImage image;
+    image.size = {10, 10, 10};
+    image.affine.linear = Mat3(1e-3);
+    image.values.assign(5, 1);
+    const VoxelGrid grid{image.size, image.affine};
+    EXPECT_THROW(resampled(image, grid), std::runtime_error);
+    EXPECT_THROW(resampledImage(grid, std::vector<float>(5), grid, 0), std::runtime_error);
 }
 
 }  // namespace

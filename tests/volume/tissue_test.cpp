@@ -1,5 +1,6 @@
 #include "bodies.h"
 
+#include <tests/error_of.h>
 #include <volume/tissue.h>
 
 #include <fmt/format.h>
@@ -217,6 +218,50 @@ TEST(Tissue, LabelMapsThatCanBeNoBodyAreRefused)
     for (const double wrong : {0.0, 1e-9, 11.0, 1e19, 1e200}) {
         EXPECT_TRUE(refused(Vec3(1e-3, 1e-3, wrong), Vec3(0.0))) << wrong;
     }
+}
+
+TEST(Tissue, TablesThatGiveNoForceAreRefused)
+{
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    struct Bad {
+        double TissueRow::*member;
+        std::vector<double> values;
+        const char* words;
+    };
+    const std::vector<Bad> all{{&TissueRow::youngsModulus, {nan, 0, -1e3, 1 / 0.0}, "Young's modulus"},
+                               {&TissueRow::poissonRatio, {nan, -0.1, 0.5}, "Poisson's ratio"},
+                               {&TissueRow::stiffening, {nan, -0.26}, "stiffening"}};
+    LabelImage image;
+    image.size = {4, 4, 4};
+    image.affine.linear = Mat3(1e-3);
+    image.values.assign(64, 1);
+    for (const Bad& bad : all) {
+        for (const double value : bad.values) {
+            TissueTable table = bodies::table();
+            table.rows[1].*bad.member = value;
+            const std::string why = tests::errorOf([&] { Tissue::fromLabels(image, table, bodies::names(), {}); });
+            EXPECT_TRUE(why.starts_with("tissue table 'test': tissue 'fat': ") && why.find(bad.words) != std::string::npos)
+                << why;
+        }
+    }
+}
+
+// Its spacing was sought with another margin: up to a tenth more nodes than there may be.
+TEST(AffordableGrid, HasNoMoreNodesThanThereMayBe)
+{
+    const Box box{{-0.05, -0.02, -0.03}, {0.05, 0.06, 0.03}};
+    for (std::size_t most = 216; most < 50000; most += 37) {
+        ASSERT_LE(affordableGrid(box, 1e-3, most).count(), most);
+    }
+    const NodeGrid fits = affordableGrid(box, 2e-3, 1U << 22U), wanted = coveringGrid(box, 2e-3, 4e-3);
+    EXPECT_EQ(fits.size, wanted.size);
+    EXPECT_EQ(fits.origin, wanted.origin);
+    EXPECT_THROW(affordableGrid(box, 1e-3, 215), std::runtime_error);
+    EXPECT_THROW(affordableSpacing(box, 1e-3, 4e-3, 7), std::runtime_error);
+    for (const double spacing : {0.0, -1e-3, std::numeric_limits<double>::quiet_NaN()}) {
+        EXPECT_THROW(affordableSpacing(box, spacing, 4e-3, 1000), std::runtime_error);
+    }
+    EXPECT_LE(coveringGrid(box, affordableSpacing(box, 1e-3, 4e-3, 8), 4e-3).count(), 8U);
 }
 
 TEST(Tissue, ANamedZeroIsTissue)
