@@ -1,5 +1,6 @@
 #include <sweep/design.h>
 
+#include <base/error.h>
 #include <boost/random/sobol.hpp>
 
 #include <algorithm>
@@ -67,6 +68,7 @@ UnitPoints latinHypercube(std::size_t samples, std::size_t axes, std::uint64_t s
 UnitPoints sobolPoints(std::size_t samples, std::size_t axes, std::uint64_t seed)
 {
     static_assert(maxSobolAxes == boost::random::default_sobol_table::max_dimension);
+    base::failIf(axes < 1 || axes > maxSobolAxes, "Sobol's points have 1 to {} axes, not {}", maxSobolAxes, axes);
     boost::random::sobol engine(axes);
     std::uint64_t state = seed;
     std::vector<std::uint64_t> shift(axes);
