@@ -102,8 +102,12 @@ void checkFilters(const ProgressArguments& o, const training::ProfileStore& stor
             ofExercise = ofExercise || s.curriculum + "/" + s.exercise == o.exercise;
         }
     }
-    ofCase ? void() : static_cast<void>(training::findCase(o.caseId));
-    ofExercise ? void() : static_cast<void>(training::findExercise(o.exercise));
+    if (!ofCase) {
+        static_cast<void>(training::findCase(o.caseId));
+    }
+    if (!ofExercise) {
+        static_cast<void>(training::findExercise(o.exercise));
+    }
 }
 
 std::vector<PeopleGroup> groupsOf(const ProgressArguments& o, const training::ProfileStore& store, Curricula& curricula)

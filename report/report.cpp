@@ -325,7 +325,9 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
 
 void checkPictures(const std::filesystem::path& folder)
 {
-    folder.empty() ? void() : static_cast<void>(pngFilesIn(folder));
+    if (!folder.empty()) {
+        static_cast<void>(pngFilesIn(folder));
+    }
 }
 
 void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures,
