@@ -265,7 +265,7 @@ private:
         Vec3f way{0.0F};
         float limit = 0;
     };
-    std::vector<Slip> slips_;  // of what friction holds, in the order of sites: by tool, and there by point
+    std::vector<Slip> slips_;  // in the order of sites: by tool, and there by point
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is

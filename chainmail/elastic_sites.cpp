@@ -152,13 +152,13 @@ void Elastic::keepSlips() noexcept
 {
     slips_.clear();
     for (const ContactSite& s : sites()) {
-        if (!s.isTie && s.limit > 0.0) {
+        if (!s.isTie) {
             slips_.push_back({s.point, s.owner, Vec3f(s.rest), Vec3f(s.slip), static_cast<float>(s.limit)});
         }
     }
 }
 
-// Points that were held before are held as they were; a piece of a point as the piece that was nearest to it.
+// Points are held as they were before, or not; a piece of a point as the piece that was nearest to it.
 void Elastic::takeSlips(std::span<ContactSite> found) noexcept
 {
     auto first = slips_.cbegin();

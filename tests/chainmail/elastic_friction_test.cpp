@@ -179,8 +179,8 @@ TEST(ElasticFriction, BallThatIsDraggedOverASmallPatchFeelsItEvenlyToo)
         drag.step = 0.0;
         drag.least = 1.0;
         drag.go(4e-6 * alongTop(20.0), 250);
-        EXPECT_LT(drag.step, 0.02) << deep;
-        EXPECT_GT(drag.least, 0.9 * 0.3) << deep;
+        EXPECT_LT(drag.step, 0.01) << deep;
+        EXPECT_GT(drag.least, 0.95 * 0.3) << deep;
     }
 }
 
