@@ -30,22 +30,33 @@ glm::dmat3 tangentOf(const ContactSite& s) noexcept
                          : s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
 }
 
-// What the nodes of a cell get of its sites. False where none touches.
-template <typename Of, typename T>
-bool addUp(std::span<const ContactSite> sitesOfCell, const Of& of, std::array<T, 8>& sum) noexcept
+// What the nodes of each cell get of the sites in it that touch, which follow each other.
+// @param of   value of a site
+// @param add  called with a site of the cell, a corner 0 to 7, and the sum of the sites' shares there
+template <typename Of, typename Add>
+void addByCell(std::span<const ContactSite> sites, const Of& of, const Add& add) noexcept
 {
-    bool touches = false;
-    for (const ContactSite& s : sitesOfCell) {
-        if (!s.active()) {
-            continue;
+    using Value = decltype(of(sites.front()));
+    for (auto first = sites.begin(); first != sites.end();) {
+        std::array<Value, 8> sum;
+        sum.fill(Value(0.0));
+        bool touches = false;
+        auto s = first;
+        for (; s != sites.end() && s->node == first->node && s->level == first->level; ++s) {
+            if (!s->active()) {
+                continue;
+            }
+            touches = true;
+            const Value value = of(*s);
+            for (std::size_t c = 0; c < sum.size(); ++c) {
+                sum[c] += static_cast<double>(s->fraction[c]) * value;
+            }
         }
-        touches = true;
-        const T value = of(s);
-        for (std::size_t c = 0; c < sum.size(); ++c) {
-            sum[c] += static_cast<double>(s.fraction[c]) * value;
+        for (std::size_t c = 0; touches && c < sum.size(); ++c) {
+            add(*first, static_cast<int>(c), sum[c]);
         }
+        first = s;
     }
-    return touches;
 }
 
 }  // namespace
@@ -227,16 +238,9 @@ double Elastic::refreshResidual(bool isCopied) noexcept
     if (!isCopied) {
         stack_.copy(Field::a, Field::r);
     }
-    forEachCell(sites(), [&](std::span<const ContactSite> sitesOfCell) {
-        std::array<Vec3, 8> sum{};
-        if (!addUp(
-                sitesOfCell, [](const ContactSite& s) { return s.force; }, sum)) {
-            return;
-        }
-        const ContactSite& any = sitesOfCell.front();
-        for (std::size_t c = 0; c < sum.size(); ++c) {
-            stack_.addForce(any.level, stack_[any.level].layout.corner(any.node, static_cast<int>(c)), sum[c]);
-        }
+    const auto forceOf = [](const ContactSite& s) { return s.force; };
+    addByCell(sites(), forceOf, [&](const ContactSite& s, int corner, Vec3 force) {
+        stack_.addForce(s.level, stack_[s.level].layout.corner(s.node, corner), force);
     });
     return std::sqrt(stack_.dot(Field::r, Field::r));
 }
@@ -244,16 +248,8 @@ double Elastic::refreshResidual(bool isCopied) noexcept
 void Elastic::prepareContacts() noexcept
 {
     multigrid_.clearContacts();
-    forEachCell(sites(), [&](std::span<const ContactSite> sitesOfCell) {
-        std::array<glm::dmat3, 8> sum;
-        sum.fill(glm::dmat3(0.0));
-        if (!addUp(sitesOfCell, tangentOf, sum)) {
-            return;
-        }
-        const ContactSite& any = sitesOfCell.front();
-        for (std::size_t c = 0; c < sum.size(); ++c) {
-            multigrid_.addContact(any.level, stack_[any.level].layout.corner(any.node, static_cast<int>(c)), sum[c]);
-        }
+    addByCell(sites(), tangentOf, [&](const ContactSite& s, int corner, const glm::dmat3& tangent) {
+        multigrid_.addContact(s.level, stack_[s.level].layout.corner(s.node, corner), tangent);
     });
     multigrid_.prepare();
 }

@@ -293,18 +293,6 @@ inline Vec3 gather(std::span<const Window> windows, const ContactSite& site, Fie
     return ValueAt(windows, field)(site);
 }
 
-/// Calls visit(first, last) for sites that follow each other in one cell, last excluded.
-template <typename Visit>
-void forEachCell(std::span<const ContactSite> sites, Visit&& visit) noexcept
-{
-    for (auto first = sites.begin(); first != sites.end();) {
-        const auto last = std::find_if(
-            first + 1, sites.end(), [&](const ContactSite& s) { return s.node != first->node || s.level != first->level; });
-        visit(std::span(first, last));
-        first = last;
-    }
-}
-
 /// Shares of a cell's nodes in what is at `t` of its edges: trilinear, x fastest.
 inline std::array<float, 8> trilinear(Vec3 t) noexcept
 {
