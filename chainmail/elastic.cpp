@@ -106,6 +106,7 @@ void Elastic::settle() noexcept
 {
     products_.reset();
     siteCount_ = touching_ = 0;
+    contactEnergy_ = 0.0;
     for (HeldTool& held : held_) {
         held.forgetContacts();
         held.blend.forget();
@@ -232,13 +233,17 @@ void Elastic::refreshForces() noexcept
     }
 }
 
-// r = forces of the tissue and of the contacts. Returns its norm.
+// r = forces of the tissue and of the contacts, whose sizes it adds up. Returns its norm.
 double Elastic::refreshResidual(bool isCopied) noexcept
 {
     if (!isCopied) {
         stack_.copy(Field::a, Field::r);
     }
-    const auto forceOf = [](const ContactSite& s) { return s.force; };
+    contactForce_ = 0.0;
+    const auto forceOf = [&](const ContactSite& s) {
+        contactForce_ += glm::length(s.force);
+        return s.force;
+    };
     addByCell(sites(), forceOf, [&](const ContactSite& s, int corner, Vec3 force) {
         stack_.addForce(s.level, stack_[s.level].layout.corner(s.node, corner), force);
     });
@@ -252,15 +257,6 @@ void Elastic::prepareContacts() noexcept
         multigrid_.addContact(s.level, stack_[s.level].layout.corner(s.node, corner), tangent);
     });
     multigrid_.prepare();
-}
-
-double Elastic::contactEnergy() const noexcept
-{
-    double sum = 0.0;
-    for (const ContactSite& s : sites()) {
-        sum += s.energy;
-    }
-    return sum;
 }
 
 // Moves the windows to where the load has them. True when any moved: contacts have to be found again.
@@ -321,7 +317,7 @@ void Elastic::findLag() noexcept
 
 void Elastic::measure(ElasticResult& result) noexcept
 {
-    result.energy = energy_ + contactEnergy();
+    result.energy = energy_ + contactEnergy_;
     for (HeldTool& held : held_) {
         held.forgetContacts();
         held.loaded = held.given;
@@ -344,25 +340,15 @@ void Elastic::measure(ElasticResult& result) noexcept
             s.stretch = now.area;
             s.stiffer = static_cast<float>(now.modulus);
             held.stretch = std::max(held.stretch, s.stretch);
+            held.felt -= balance_ * s.force;
         }
     }
-}
-
-// Sum of the contacts' forces, each by its size [N].
-double Elastic::contactForce() const noexcept
-{
-    double sum = 0.0;
-    for (const ContactSite& s : sites()) {
-        sum += glm::length(s.force);
-    }
-    return sum;
 }
 
 // What the residual is measured by. Tissue that springs back under a tool that lifts off has more force than the contact.
 double Elastic::loadForce() const noexcept
 {
-    const double contacts = contactForce();
-    return stack_.body().relaxes ? std::max(contacts, std::sqrt(stack_.dot(Field::h, Field::h))) : contacts;
+    return stack_.body().relaxes ? std::max(contactForce_, std::sqrt(stack_.dot(Field::h, Field::h))) : contactForce_;
 }
 
 // Each tool's force from where the windows were to where they are. What is solved otherwise than tick by tick has its own.
@@ -371,28 +357,27 @@ void Elastic::blendMoves(bool isTick, bool moved) noexcept
     for (std::size_t i = 0; i < held_.size(); ++i) {
         HeldTool& held = held_[i];
         if (isTick) {
-            held.blend.count(held.ownForce(sumOfContacts(i, false)), tools_[i].shape.a + held.behind * held.inward, moved);
+            held.blend.count(held.ownForce(), tools_[i].shape.a + held.behind * held.inward, moved);
         } else {
             held.blend.forget();
         }
     }
 }
 
-Vec3 Elastic::sumOfContacts(std::size_t owner, bool isTie) const noexcept
+Vec3 Elastic::toolForce(std::size_t i) const noexcept
+{
+    return i < held_.size() ? held_[i].force() : Vec3(0.0);
+}
+
+Vec3 Elastic::tieForce(std::size_t i) const noexcept
 {
     Vec3 sum(0.0);
-    for (const ContactSite& s : sites()) {
-        if (s.owner == owner && s.isTie == isTie) {
+    for (const ContactSite& s : sites().subspan(touching_)) {
+        if (s.owner == i) {
             sum -= balance_ * s.force;
         }
     }
     return sum;
-}
-
-Vec3 Elastic::toolForce(std::size_t i) const noexcept
-{
-    const Vec3 sum = sumOfContacts(i, false);
-    return i < held_.size() ? held_[i].force(sum) : sum;
 }
 
 }  // namespace palpate::chainmail

@@ -101,7 +101,7 @@ public:
     /// the dual solution, see findLag().
     /// Over a move of the windows, toolForce() is blended, see MoveBlend.
     Vec3 toolForce(std::size_t i) const noexcept;
-    Vec3 tieForce(std::size_t i) const noexcept { return sumOfContacts(i, true); }
+    Vec3 tieForce(std::size_t i) const noexcept;
     /// By how much tool `i` of the last load is held back on its way to what is held in space, see HeldTool [m].
     double behind(std::size_t i) const noexcept
     {
@@ -150,7 +150,8 @@ private:
     struct LastStep {
         Field direction = Field::d;
         Field image = Field::e;
-        Parabola tissue;  // along all of it, where it led
+        Parabola tissue;    // along all of it, where it led
+        double length = 0;  // of it, in the sites' p
     };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
@@ -199,7 +200,6 @@ private:
     void settle() noexcept;
     void startAnew() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
-    void spreadPressure() noexcept;
     bool touched() const noexcept;
     WindowStack::Evaluated tissueForce(Field y, Field along) noexcept;
     void refreshForces() noexcept;
@@ -208,14 +208,22 @@ private:
     void takeGiven() noexcept;
     double refreshResidual(bool isCopied) noexcept;
     void prepareContacts() noexcept;
-    void look() noexcept;
+    Along look() noexcept;
     double lineSearch(double slope, double curvature, Along start, int steps) const noexcept;
-    double contactEnergy() const noexcept;
     bool sitesHold(std::span<const ElasticTool> tools) const noexcept;
     bool tiesHold(std::span<const Tie> ties) const noexcept;
     void findSitesOf(const ElasticLoad& load, bool moved) noexcept;
+    // Calls visit(site) for all, which sets their energy.
+    template <typename Visit>
+    void touchAll(const Visit& visit) noexcept
+    {
+        contactEnergy_ = 0.0;
+        for (ContactSite& s : active()) {
+            visit(s);
+            contactEnergy_ += s.energy;
+        }
+    }
     void moveSites(double length) noexcept;
-    void drag(const ElasticLoad& load) noexcept;
     void letSlip() noexcept;
     void keepSlips() noexcept;
     void takeSlips(std::span<ContactSite> found) noexcept;
@@ -232,13 +240,11 @@ private:
     void forgetIncrement() noexcept;
     void forgetStep() noexcept;
     bool step(double limit, ElasticResult& result) noexcept;
-    double contactForce() const noexcept;
     double loadForce() const noexcept;
     void balance() noexcept;
     void findLag() noexcept;
     void measure(ElasticResult& result) noexcept;
     void blendMoves(bool isTick, bool moved) noexcept;
-    Vec3 sumOfContacts(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;
     volume::Reach reach_;
@@ -275,6 +281,8 @@ private:
     double historyEnergy_ = 0;                          // history . u [J]
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
+    double contactEnergy_ = 0;                          // [J]
+    double contactForce_ = 0;                           // sum of the contacts' forces, each by its size, in r [N]
     Course course_;
     std::optional<Vec3> stuck_;           // the middle of the tissue that sticks to the tool that is led, at rest [m]
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
@@ -286,6 +294,7 @@ private:
     int sinceRefresh_ = 0;
     int sinceFound_ = 0;         // calls since surface points were looked for
     double untouchedFor_ = 0.0;  // [s]
+    bool slides_ = false;        // a tool has friction
     bool atRest_ = true;
     bool hasIncrement_ = false;
 };

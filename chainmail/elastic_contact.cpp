@@ -248,7 +248,6 @@ void addFriction(const ContactSite& s, double alpha, Along& sum) noexcept
     const double held = length > 0.0 ? std::min(s.limit / length, 1.0) : 1.0;
     const double rate = glm::dot(stretch, side);
     const double turning = length < s.limit ? 0.0 : rate * rate / (length * length);
-    sum.energy += frictionEnergy(s.grip(), length, s.limit);
     sum.slope -= s.grip() * held * rate;
     sum.curvature += s.grip() * held * (glm::dot(side, side) - turning);
 }
@@ -284,28 +283,31 @@ void press(ContactSite& site) noexcept
     site.energy += frictionEnergy(site.grip(), length, site.limit);
 }
 
+void Along::add(const ContactSite& s, double alpha) noexcept
+{
+    if (s.isTie) {
+        const Vec3 resisted = s.resist(s.p);
+        const double along = glm::dot(resisted, s.p);
+        const double start = -glm::dot(s.force, s.p);
+        slope += start + along * alpha;
+        curvature += along;
+        return;
+    }
+    const double rate = -glm::dot(s.normal, s.p);
+    const double depth = std::max(s.depth + alpha * rate, 0.0);
+    const double push = s.stiffness * depth;
+    slope += push * rate;
+    curvature += depth > 0.0 ? s.stiffness * rate * rate : 0.0;
+    if (s.limit > 0.0) {
+        addFriction(s, alpha, *this);
+    }
+}
+
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
 {
     Along sum;
     for (const ContactSite& s : sites) {
-        if (s.isTie) {
-            const Vec3 resisted = s.resist(s.p);
-            const double curvature = glm::dot(resisted, s.p);
-            const double slope = -glm::dot(s.force, s.p);
-            sum.energy += s.energy + (slope + 0.5 * curvature * alpha) * alpha;
-            sum.slope += slope + curvature * alpha;
-            sum.curvature += curvature;
-            continue;
-        }
-        const double rate = -glm::dot(s.normal, s.p);
-        const double depth = std::max(s.depth + alpha * rate, 0.0);
-        const double push = s.stiffness * depth;
-        sum.energy += 0.5 * push * depth;
-        sum.slope += push * rate;
-        sum.curvature += depth > 0.0 ? s.stiffness * rate * rate : 0.0;
-        if (s.limit > 0.0) {
-            addFriction(s, alpha, sum);
-        }
+        sum.add(s, alpha);
     }
     return sum;
 }

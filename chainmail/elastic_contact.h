@@ -141,13 +141,12 @@ void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, 
 /// The same where only the slip or its limit is another. @pre the site is no tie
 void press(ContactSite& site) noexcept;
 
-/// The energy of the contacts along the direction p, and its derivatives by the way.
+/// Derivatives of the contacts' energy by the way along the direction p [J].
 struct Along {
-    double energy = 0;  // [J]
-    double slope = 0;
-    double curvature = 0;
+    double slope = 0, curvature = 0;
+    /// Adds a contact's at `alpha` of the way, to first order in the tool's surface: depth falls by normal . p.
+    void add(const ContactSite& site, double alpha) noexcept;
 };
-/// To first order in the tool's surface: depth falls by normal . p.
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 
 /// ElasticTool::stiffest with which every tissue of the body's surface that gives way is held by 20 E / h: for forces that

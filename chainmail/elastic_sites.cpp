@@ -75,6 +75,46 @@ private:
     ResolvedShare share_;
 };
 
+// Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches
+// less than the cells of a window resolve, by Hertz's radius of what it touches, and a small tool the less so the deeper
+// it is in its radii (decisions 321, 334). Tissue that something rigid confines gives way less under the same pressure, by
+// f^(1/3) where it bears f times what a half-space would at this depth, and so may they: that is by how much the patch is
+// wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force on a small patch may be
+// twice too large, and tissue that relaxes, whose force falls while it lies as before, take the patch by the depth.
+// All this is kept while a call solves, so that a call keeps one energy.
+class Pressures {
+public:
+    Pressures(const WindowStack& stack, const volume::Law& law, std::span<const ElasticTool> tools,
+              std::span<const HeldTool> held) noexcept
+        : body_(stack.body()), tools_(tools), held_(held), isSmall_(volume::isSmall(law)), stretchAt_(stack, law)
+    {
+    }
+
+    // Stiffness of a surface point. Those of a tool in one window follow each other.
+    void spread(ContactSite& s) noexcept
+    {
+        if (s.owner != owner_ || s.level != level_) {
+            owner_ = s.owner;
+            level_ = s.level;
+            under_.emplace(tools_[s.owner], held_[s.owner], body_, s.level, isSmall_);
+        }
+        // What moved last was measured then.
+        const Stretch now = isSmall_          ? Stretch{}
+                            : s.stretch > 0.0 ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
+                                              : stretchAt_(s);
+        under_->spread(s, now, body_.points[s.point].sliver);
+    }
+
+private:
+    const ElasticBody& body_;
+    std::span<const ElasticTool> tools_;
+    std::span<const HeldTool> held_;
+    bool isSmall_;
+    StretchAt stretchAt_;
+    std::optional<Pressure> under_;
+    std::size_t owner_ = ElasticLoad::noTool, level_ = 0;
+};
+
 }  // namespace
 
 // The tools, held back where the body does not bear them.
@@ -188,43 +228,26 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
     ties_ = load.ties;
     findSitesOf(load, moved);
-    drag(load);
-    spreadPressure();
-    for (ContactSite& s : active()) {
+    slides_ = std::ranges::any_of(load.tools, [](const ElasticTool& tool) { return tool.friction > 0.0; });
+    // Tools that moved on take the points that they hold along.
+    const bool drags = slides_ && toolAt_.size() == load.tools.size();
+    Pressures pressures(stack_, options_.law, tools_, held_);
+    touchAll([&](ContactSite& s) {
+        if (!s.isTie) {
+            if (drags) {
+                s.slip += wayOf(s.rest + s.u, toolAt_[s.owner], load.tools[s.owner].shape);
+            }
+            pressures.spread(s);
+        }
         touch(s, shapes_, ties_);
         if (const double friction = frictionOf(s); friction > 0.0 && s.limit <= 0.0) {
             s.limitBy(friction);
             press(s);
         }
-    }
-}
-
-// Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches
-// less than the cells of a window resolve, by Hertz's radius of what it touches, and a small tool the less so the deeper
-// it is in its radii (decisions 321, 334). Tissue that something rigid confines gives way less under the same pressure, by
-// f^(1/3) where it bears f times what a half-space would at this depth, and so may they: that is by how much the patch is
-// wider. Hertz's law is no measure of it deeper than a radius. Wider windows, whose force on a small patch may be
-// twice too large, and tissue that relaxes, whose force falls while it lies as before, take the patch by the depth.
-// All this is kept while a call solves, so that a call keeps one energy.
-void Elastic::spreadPressure() noexcept
-{
-    const bool isSmall = volume::isSmall(options_.law);
-    StretchAt stretchAt(stack_, options_.law);
-    std::optional<Pressure> under;
-    const ContactSite* before = nullptr;
-    for (ContactSite& s : active()) {
-        if (s.isTie) {
-            continue;
-        }
-        if (before == nullptr || before->owner != s.owner || before->level != s.level) {
-            under.emplace(tools_[s.owner], held_[s.owner], stack_.body(), s.level, isSmall);
-            before = &s;
-        }
-        // What moved last was measured then.
-        const Stretch now = isSmall           ? Stretch{}
-                            : s.stretch > 0.0 ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
-                                              : stretchAt(s);
-        under->spread(s, now, stack_.body().points[s.point].sliver);
+    });
+    toolAt_.clear();
+    for (const ElasticTool& tool : load.tools) {
+        toolAt_.push_back(tool.shape);
     }
 }
 
@@ -238,41 +261,32 @@ bool Elastic::touched() const noexcept
 
 void Elastic::moveSites(double length) noexcept
 {
-    for (ContactSite& s : active()) {
+    touchAll([&](ContactSite& s) {
         s.u += length * s.p;
-        s.slip -= length * s.p;
-        touch(s, shapes_, ties_);
-    }
-}
-
-// Tools that moved on take the points that they hold along.
-void Elastic::drag(const ElasticLoad& load) noexcept
-{
-    if (toolAt_.size() == load.tools.size()) {
-        for (ContactSite& s : active()) {
-            s.slip += s.isTie ? Vec3(0.0) : wayOf(s.rest + s.u, toolAt_[s.owner], load.tools[s.owner].shape);
+        if (slides_) {
+            s.slip -= length * s.p;
         }
-    }
-    toolAt_.clear();
-    for (const ElasticTool& tool : load.tools) {
-        toolAt_.push_back(tool.shape);
-    }
+        touch(s, shapes_, ties_);
+    });
 }
 
 // Beyond what friction holds by the contact's own force the tool has slipped, for good.
 void Elastic::letSlip() noexcept
 {
-    for (ContactSite& s : active()) {
+    if (!slides_) {
+        return;
+    }
+    touchAll([&](ContactSite& s) {
         const double friction = frictionOf(s);
         if (friction <= 0.0) {
-            continue;
+            return;
         }
         s.limitBy(friction);
         const Vec3 along = s.along();
         const double length = glm::length(along);
         s.slip = length > s.limit ? s.limit / length * along : along;
         press(s);
-    }
+    });
 }
 
 double Elastic::frictionOf(const ContactSite& site) const noexcept

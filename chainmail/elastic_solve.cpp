@@ -59,7 +59,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     if (hasLain) {
         remember(load.periods);
     }
-    course_ = {.effort = effort, .start = energy_ + contactEnergy()};
+    course_ = {.effort = effort, .start = energy_ + contactEnergy_};
     result.start = course_.start;
     startEnergy_ = energy_;
     if (hasIncrement_) {
@@ -92,7 +92,7 @@ ElasticResult Elastic::goOn(bool isLast) noexcept
     if (atRest_ || c.next >= c.last) {
         return result;
     }
-    result.start = energy_ + contactEnergy();
+    result.start = energy_ + contactEnergy_;
     result.cycles = static_cast<std::uint32_t>(c.next);
     if (!c.isHalf) {
         result.residual = refreshResidual(std::exchange(c.hasGone, false));
@@ -190,7 +190,7 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 
 void Elastic::finish(ElasticResult& result) noexcept
 {
-    if (!std::isfinite(energy_ + contactEnergy())) {
+    if (!std::isfinite(energy_ + contactEnergy_)) {
         startAnew();
         return;
     }

@@ -29,18 +29,21 @@ double shorter(double alpha, double slope, double change) noexcept
 
 }  // namespace
 
-// The last call's increment is the direction that the next step is made conjugate to.
-void Elastic::look() noexcept
+// The last call's increment is the direction that the next step is made conjugate to. Returns what contacts do along it.
+Along Elastic::look() noexcept
 {
     ValueAt increment(stack_.windows(), Field::d);
+    Along contacts;
     for (ContactSite& s : active()) {
         s.p = increment(s);
+        contacts.add(s, 0.0);
     }
     if (!products_) {
         const auto product = stack_.dots(Field::d, Field::a, Field::e);
         products_ = {stack_.dot(Field::u, Field::a), product[0], product[1]};
     }
     last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}};
+    return contacts;
 }
 
 // How far to go: Newton on the slope of the energy, the tissue's part a parabola, contacts opening and closing on the way.
@@ -64,14 +67,14 @@ double Elastic::lineSearch(double slope, double curvature, Along at, int steps) 
 double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexcept
 {
     const double start = energy_;
-    const double before = start + contactEnergy();
+    const double before = start + contactEnergy_;
     const double slope = to.tissue.slope;
     const double steepness = slope + to.contacts.slope;
     double length = lineSearch(slope, to.tissue.curvature, to.contacts, newtonSteps);
     for (int i = 0; length != 0.0; ++i) {
         moveSites(length);
         energy_ = start + to.tissue.at(length);
-        const double change = energy_ + contactEnergy() - before;
+        const double change = energy_ + contactEnergy_ - before;
         if (change <= rounding * (std::abs(before) + std::abs(historyEnergy_) + std::abs(slope * length))) {
             return length;
         }
@@ -87,18 +90,16 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
 // energy go along the parabola: the next step evaluates them, or confirm().
 bool Elastic::warmStart(ElasticResult& result) noexcept
 {
-    look();
-    const double length = searchParabola({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, result);
+    const Along contacts = look();
+    const double length = searchParabola({Field::d, 0.0, last_.tissue, contacts}, result);
     if (length == 0.0) {
         forgetIncrement();
         return false;
     }
-    for (ContactSite& s : active()) {
-        s.p *= length;
-    }
     stack_.warmStart(length);
     products_.reset();
     last_.tissue = last_.tissue.from(length);
+    last_.length = length;
     return true;
 }
 
@@ -106,7 +107,7 @@ bool Elastic::warmStart(ElasticResult& result) noexcept
 bool Elastic::confirm(double start) noexcept
 {
     energy_ = tissueForce(Field::f, Field::d).energy;
-    if (energy_ + contactEnergy() - start > rounding * (std::abs(start) + std::abs(historyEnergy_))) {
+    if (energy_ + contactEnergy_ - start > rounding * (std::abs(start) + std::abs(historyEnergy_))) {
         retreat();
         return false;
     }
@@ -122,12 +123,12 @@ void Elastic::retreat() noexcept
     stack_.combine(Field::a, -1.0, Field::e, Field::a);
     energy_ = startEnergy_;
     ValueAt displacement(stack_.windows(), Field::u);
-    for (ContactSite& s : active()) {
+    touchAll([&](ContactSite& s) {
         const Vec3 u = displacement(s);
         s.slip += s.u - u;
         s.u = u;
         touch(s, shapes_, ties_);
-    }
+    });
 }
 
 // At small strain the tissue's energy is a parabola, and one operator gives its curvature.
@@ -154,7 +155,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         return takeLinearStep(to, result);
     }
     const double start = energy_;
-    const double before = std::max(limit, start + contactEnergy());
+    const double before = std::max(limit, start + contactEnergy_);
     const Along& contacts = to.contacts;
     const double slope = to.tissue.slope;
     const double steepness = slope + contacts.slope;
@@ -182,7 +183,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         moveSites(length);
         energy_ = now.energy + tissue.at(length) - tissue.at(gone);
         const double scale = std::abs(before) + std::abs(historyEnergy_) + std::abs(slope * length);
-        const double change = energy_ + contactEnergy() - before;
+        const double change = energy_ + contactEnergy_ - before;
         if (change <= rounding * scale) {
             Direction found = to;
             found.tissue = tissue;
@@ -206,11 +207,8 @@ void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
     const double length = static_cast<double>(step.length);
     step.keep = again ? 0.0F : 1.0F;
     products_ = stack_.keepStep(to.field, step);
-    for (ContactSite& s : active()) {
-        s.p *= length;
-    }
     stiffness_ = to.tissue.curvature + to.contacts.curvature;
-    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length)};
+    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length), length};
 }
 
 // One step of preconditioned conjugate gradients, conjugate to the last: along the correction z of the forces out of
@@ -224,6 +222,7 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
     double work = product[0];  // of the residual along z
     ValueAt correction(stack_.windows(), Field::z);
     for (ContactSite& s : active()) {
+        s.p = last_.length != 0.0 ? last_.length * s.p : Vec3(0.0);
         const Vec3 resisted = s.resist(s.p);
         s.z = correction(s);
         own += glm::dot(s.p, resisted);
@@ -231,10 +230,11 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
         work += glm::dot(s.z, s.force);
     }
     const double beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
+    Direction to{Field::p, beta, {beta * last_.tissue.slope - product[0], 0.0}, {}};
     for (ContactSite& s : active()) {
         s.p = s.z + beta * s.p;
+        to.contacts.add(s, 0.0);
     }
-    Direction to{Field::p, beta, {beta * last_.tissue.slope - product[0], 0.0}, contactsAlong(sites(), 0.0)};
     // Along z the stiffness is the work but for how near the preconditioner is, as in the cycle before; made conjugate, it
     // is less by what the increment has of it.
     const double conjugate = -beta * mixed;
@@ -251,8 +251,8 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
 // Steps along the last call's increment. With the tissue's force evaluated it is sure not to go up.
 void Elastic::again(ElasticResult& result) noexcept
 {
-    look();
-    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, noLimit, result)) {
+    const Along contacts = look();
+    if (!takeStep({Field::d, 0.0, last_.tissue, contacts}, noLimit, result)) {
         forgetIncrement();
     }
 }
@@ -279,9 +279,6 @@ void Elastic::startAnew() noexcept
 void Elastic::forgetStep() noexcept
 {
     last_ = {};
-    for (ContactSite& s : active()) {
-        s.p = Vec3(0.0);
-    }
 }
 
 }  // namespace palpate::chainmail

@@ -108,7 +108,7 @@ double HeldTool::changed() const noexcept
     return std::pow(change / std::clamp(change, 1.0 - still, 1.0 + still), 1.5);
 }
 
-Vec3 HeldTool::ownForce(Vec3 felt) const noexcept
+Vec3 HeldTool::ownForce() const noexcept
 {
     return outward(std::pow(deeper, 1.5) * (felt - lag) - stopped * inward);
 }

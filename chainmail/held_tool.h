@@ -24,7 +24,8 @@ struct HeldTool {
     double deeper = 1;    // the real one's depth over that, from a least one on [-]
     double depth = 0;     // to which the surface sank into it in the last call [m]
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
-    double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
+    Vec3 felt{0.0};       // force of its contacts in the last call [N]
+    double load = 0;      // sum of the sizes of these [N]
     double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
     double onEnds = 0;    // and of those on its ends, which is all of a ball's [N]
     double loaded = 0;    // how deep it was then [m]
@@ -39,7 +40,7 @@ struct HeldTool {
     void forgetContacts() noexcept
     {
         depth = sunk = load = onEnds = indented = stretch = 0.0;
-        lag = Vec3(0.0);
+        felt = lag = Vec3(0.0);
     }
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
@@ -48,11 +49,11 @@ struct HeldTool {
     /// has changed by more than five percent: a tool that leaves is out after a few calls. Less is left as it is, since
     /// what follows every tremor of a hand makes it larger.
     double changed() const noexcept;
-    /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
-    /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
-    Vec3 force(Vec3 felt) const noexcept { return outward(ownForce(felt) + blend.offset()); }
+    /// The force on the real tool, by that on the one which the body feels, `felt` [N]. Without friction it has no part
+    /// into the body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
+    Vec3 force() const noexcept { return outward(ownForce() + blend.offset()); }
     /// The same of the windows where they are.
-    Vec3 ownForce(Vec3 felt) const noexcept;
+    Vec3 ownForce() const noexcept;
 
 private:
     Vec3 outward(Vec3 force) const noexcept;
