@@ -40,10 +40,11 @@ bool finite(Vec3 v) noexcept
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Whether cap and period are such that they limit a force.
+// Whether cap, period and delay are such that a force can be limited by them.
 bool isLimiting(const StabiliserOptions& o) noexcept
 {
-    return o.cap >= 0.0 && o.device.peakForce >= 0.0 && o.period > 0.0 && std::isfinite(o.period);
+    return o.device.delay >= 0.0 && std::isfinite(o.device.delay) && o.cap >= 0.0 && o.device.peakForce >= 0.0 &&
+           o.period > 0.0 && std::isfinite(o.period);
 }
 
 // Nothing is sent from now on.

@@ -106,7 +106,7 @@ struct StabiliserState {
 /// What stands between computed forces and a hand; in this order:
 ///
 /// - Fault: after a force or a pose that is not finite nothing is sent any more; neither after a sum that would not be
-///   finite, nor with a cap or a period that limits nothing (negative, not a number).
+///   finite, nor with a cap, a period or a delay of the device that limits nothing (negative, not a number).
 /// - Virtual coupling: while the force rises faster along the motion than the stable stiffness, it rises at that, as
 ///   through a spring in series, and catches up when the hand is slow or stands still. Below it the force passes unchanged.
 /// - Passivity: a force that is held for a period and comes late gives K v^2 (T / 2 + t_d) more than the tissue would

@@ -171,11 +171,15 @@ TEST(Stabiliser, WithoutALimitNothingIsSent)
     for (const double period : {nan, 0.0, -1e-3, infinite}) {
         options.push_back({premium.device, period, premium.cap});
     }
+    for (const double delay : {nan, -1e-3, infinite}) {
+        options.push_back(premium);
+        options.back().device.delay = delay;
+    }
     for (const StabiliserOptions& o : options) {
         StabiliserState state;
         for (int i = 0; i < 100; ++i) {
             const SentForce sent = stabilise(Vec3(200, 0, 0), Vec3(0.0), heldAt({-1e-4 * i, 0, 0}), o, state);
-            ASSERT_EQ(sent.total(), Vec3(0.0)) << o.cap << " N, " << o.period << " s";
+            ASSERT_EQ(sent.total(), Vec3(0.0)) << o.cap << " N, " << o.period << " s, " << o.device.delay << " s";
             ASSERT_TRUE(sent.faulted);
         }
     }
