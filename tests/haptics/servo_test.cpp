@@ -12,20 +12,68 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <type_traits>
 #include <vector>
 
 namespace palpate::haptics {
 namespace {
+
+// Memory that this process has locked [kB].
+double lockedMemory()
+{
+    std::ifstream status("/proc/self/status");
+    std::string word;
+    while (status >> word && word != "VmLck:") {
+    }
+    double kilobytes = -1;
+    status >> kilobytes;
+    return kilobytes;
+}
+
+// A host of sessions had all its memory locked for good. Where locking is not permitted nothing is ever locked.
+TEST(RealTimeClaim, MemoryIsLockedUntilTheLastClaimEnds)
+{
+    std::thread([] {
+        const auto lockedByOne = [] {
+            const RealTimeClaim claim;
+            return lockedMemory() > 0;
+        };
+        ASSERT_EQ(lockedMemory(), 0);
+        ::mlockall(MCL_CURRENT | MCL_FUTURE);
+        const bool may = lockedMemory() > 0;  // nor with a sanitizer
+        ::munlockall();
+        EXPECT_EQ(lockedByOne(), may);
+        EXPECT_EQ(lockedMemory(), 0);
+        auto first = std::make_unique<RealTimeClaim>();
+        auto second = std::make_unique<RealTimeClaim>();
+        first.reset();
+        EXPECT_EQ(lockedMemory() > 0, may);
+        second.reset();
+        EXPECT_EQ(lockedMemory(), 0);
+        if (may) {
+            // What the host locked by itself stays.
+            const auto page = std::make_unique<std::array<char, 16384>>();
+            ASSERT_EQ(::mlock(page->data(), page->size()), 0);
+            lockedByOne();
+            EXPECT_GT(lockedMemory(), 0);
+            ::munlockall();
+        }
+    }).join();
+}
 
 std::vector<datasets::TraineeStep> waitFor(double seconds)
 {
