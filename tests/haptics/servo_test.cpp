@@ -353,6 +353,24 @@ TEST(Broadcast, ViewerSeesTheStateAndTheDisplacedNodes)
     EXPECT_EQ(viewer->state()->status, channel::Status::finished);
 }
 
+// Without a clock no tick is late, which is not "0 missed".
+TEST(Broadcast, MissedTicksAreCountedAgainstTheClockOnly)
+{
+    for (const bool paced : {true, false}) {
+        const std::string session = "test-paced-" + std::to_string(getpid());
+        Rig rig;
+        Broadcast broadcast(session, tests::blockSphere());
+        const auto viewer = channel::Subscriber::attach(session);
+        ASSERT_TRUE(viewer.has_value());
+        runServo(
+            rig.hand, rig.simulation, {paced, 0.02},
+            [&](const TickRecord& r, const ServoTiming& timing) { broadcast.publish(r, timing, rig.simulation); },
+            rig.stop);
+        ASSERT_TRUE(viewer->state().has_value());
+        EXPECT_EQ(viewer->state()->missed == channel::notCounted, !paced);
+    }
+}
+
 // 31 bytes are there for it; a letter of two bytes is there whole or not at all.
 TEST(Broadcast, SaysWhoTrains)
 {
