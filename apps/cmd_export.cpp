@@ -29,6 +29,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace palpate::apps {
 
@@ -92,9 +93,9 @@ void checkOptions(ExportArguments& o)
     base::checkOutputs({o.output, volume::exportedDataOf(o.output), o.map, o.json}, {o.volume, o.record, o.like});
 }
 
-bool isCtRecord(const std::string& record)
+bool isCtRecord(const haptics::Record& record)
 {
-    return haptics::scanDoseOf(haptics::Record(record).info()) > 0;
+    return haptics::scanDoseOf(record.info()) > 0;
 }
 
 // What would change nothing in what is written is a mistake.
@@ -176,10 +177,10 @@ void exportVolume(const ExportArguments& o, const volume::ExportOptions& how)
 }
 
 // What to say of it behind the file's name.
-std::string exportState(const ExportArguments& o, const volume::ExportOptions& how,
+std::string exportState(const ExportArguments& o, haptics::Record record, const volume::ExportOptions& how,
                         const std::function<void(double)>& progress, nlohmann::json& figures)
 {
-    const session::DeformedState state(o.record, timeFrom(o.at), progress);
+    const session::DeformedState state(std::move(record), timeFrom(o.at), progress);
     const auto& lattice = state.model().lattice;
     if (o.what == "labels") {
         volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
@@ -199,10 +200,10 @@ std::string exportState(const ExportArguments& o, const volume::ExportOptions& h
 }
 
 // A CT scan of a record's body at one moment, as a viewer would show it. Returns what to say of it, as those around.
-std::string exportCt(const ExportArguments& o, const std::function<void(double)>& progress)
+std::string exportCt(const ExportArguments& o, const haptics::Record& record, const std::function<void(double)>& progress)
 {
-    base::failIf(!isCtRecord(o.record), "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
-    const session::ShownState shown = session::shownState(o.record, timeFrom(o.at), std::nullopt, progress);
+    base::failIf(!isCtRecord(record), "{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
+    const session::ShownState shown = session::shownState(record, timeFrom(o.at), std::nullopt, progress);
     const haptics::Showing& s = shown.showing;
     channel::Deformation body(s.scenery, s.labels);
     body.apply(*shown.shape);
@@ -215,15 +216,16 @@ std::string exportCt(const ExportArguments& o, const std::function<void(double)>
 
 // The ultrasound picture of a record at one moment, bit for bit as a viewer stores it: with probe, settings, size and
 // moment of the stored image `like`, or the session's own.
-std::string exportUltrasound(const ExportArguments& o, const std::function<void(double)>& progress)
+std::string exportUltrasound(const ExportArguments& o, const haptics::Record& record,
+                             const std::function<void(double)>& progress)
 {
-    base::failIf(isCtRecord(o.record),
+    base::failIf(isCtRecord(record),
                  "{}: its scene is guided by CT and has no ultrasound picture: leave out --what ultrasound and --like",
                  o.record);
     const auto like = o.like.empty() ? std::nullopt : std::optional(ultrasound::readStored(o.like));
-    const double at = like ? static_cast<double>(like->image.tick) / haptics::Record(o.record).info().rate : timeFrom(o.at);
+    const double at = like ? static_cast<double>(like->image.tick) / record.info().rate : timeFrom(o.at);
     const session::ShownState shown =
-        session::shownState(o.record, at, like ? std::optional(like->image.shapeTick) : std::nullopt, progress);
+        session::shownState(record, at, like ? std::optional(like->image.shapeTick) : std::nullopt, progress);
     const haptics::Showing& s = shown.showing;
     ultrasound::Scanner scanner(s.scenery, s.labels, s.fine);
     channel::Deformation body(s.scenery, s.labels);
@@ -253,7 +255,8 @@ void runExport(const CLI::App& app, ExportArguments o)
 {
     const bool usual = o.what.empty();
     checkOptions(o);
-    if (usual && o.what == "ultrasound" && o.like.empty() && isCtRecord(o.record)) {
+    auto record = o.record.empty() ? std::nullopt : std::optional<haptics::Record>(std::in_place, o.record);
+    if (usual && o.what == "ultrasound" && o.like.empty() && isCtRecord(*record)) {
         o.what = "ct";
     }
     checkUse(app, o);
@@ -265,14 +268,14 @@ void runExport(const CLI::App& app, ExportArguments o)
     nlohmann::json figures{{"file", o.output.string()}, {"what", o.what}};
     std::string more;
     const auto again = [&](double fraction) { progress.show("computing the session again", fraction); };
-    if (o.record.empty()) {
+    if (!record) {
         exportVolume(o, how);
     } else if (o.what == "ultrasound") {
-        more = exportUltrasound(o, again);
+        more = exportUltrasound(o, *record, again);
     } else if (o.what == "ct") {
-        more = exportCt(o, again);
+        more = exportCt(o, *record, again);
     } else {
-        more = exportState(o, how, again, figures);
+        more = exportState(o, std::move(*record), how, again, figures);
     }
     progress.clear();
     if (o.json != "-") {

@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <memory>
 #include <new>
@@ -57,6 +58,22 @@ nlohmann::json importFigures(const prepare::ImportedVolume& made)
     return figures;
 }
 
+// Whether figures would replace a file of somebody else in a folder that is read.
+bool replacesForeign(const ImportArguments& o)
+{
+    std::error_code none;
+    if (!fs::is_directory(o.input, none) || !fs::is_regular_file(o.json, none)) {
+        return false;
+    }
+    const fs::path within = fs::weakly_canonical(o.json, none).lexically_relative(fs::weakly_canonical(o.input, none));
+    if (within.empty() || *within.begin() == "..") {
+        return false;
+    }
+    std::ifstream in(o.json);
+    const auto there = nlohmann::json::parse(in, nullptr, false);
+    return !there.is_object() || !there.contains("overlaps") || !there.contains("labels");  // see importFigures()
+}
+
 void checkOptions(const ImportArguments& o)
 {
     base::failIf(o.output.empty() == o.mapping.writeMap.empty(),
@@ -67,6 +84,10 @@ void checkOptions(const ImportArguments& o)
     base::checkOutputs({o.output, o.mapping.writeMap, o.json},
                        {o.input, o.image, o.stiffness, o.tissues, o.mapping.map, o.mapping.names});
     prepare::checkReplaced(o, {o.output, o.mapping.writeMap, o.json});
+    base::failIf(replacesForeign(o),
+                 "{}: is there already, in the folder that is read, and no import wrote it: give --json another name, or "
+                 "remove it",
+                 o.json.native());
     std::error_code none;
     base::failIf(fs::is_regular_file(o.mapping.writeMap, none),
                  "{}: is there already, perhaps with what you filled in: give --write-map another name, or remove it",

@@ -131,7 +131,7 @@ void planScene(const PlanArguments& o)
         request.costs = planner::loadCosts(o.costs);
     }
 
-    command::Progress progress;
+    command::Progress progress(command::Progress::Clock::ticking);
     progress.show(o.scene + ": volume");
     session::SceneChanges changes;
     changes.model = "spring";  // the bodies are made here, one per spacing

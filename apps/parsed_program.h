@@ -12,6 +12,7 @@
 #include <exception>
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 namespace palpate::apps {
 
@@ -33,6 +34,11 @@ int exitStatus(const CLI::App& app, const Work& work)
         return e.exitStatus();
     } catch (const std::filesystem::filesystem_error& e) {
         say(base::inWords(e));
+    } catch (const std::system_error& e) {
+        const bool noThread = e.code() == std::errc::resource_unavailable_try_again;
+        say(noThread
+                ? std::string("no thread can be started (") + e.what() + "): end other programs, or allow more (ulimit -u)"
+                : e.what());
     } catch (const std::exception& e) {
         say(e.what());
     }

@@ -82,7 +82,7 @@ std::uint64_t missedIn(const Record& record)
 {
     const std::string said = record.result("missed_ticks");
     std::uint64_t missed = 0;
-    return std::from_chars(said.data(), said.data() + said.size(), missed).ec == std::errc() ? missed : render::notCounted;
+    return std::from_chars(said.data(), said.data() + said.size(), missed).ec == std::errc() ? missed : channel::notCounted;
 }
 
 }  // namespace

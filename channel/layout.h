@@ -141,6 +141,9 @@ struct ProbePose {
     double force = 0;         // that the body presses back with [N]
 };
 
+/// State::missed of a session that keeps no clock, and of a record that does not say it.
+inline constexpr std::uint64_t notCounted = ~std::uint64_t{0};
+
 /// The state of one tick.
 struct State {
     std::uint64_t tick = 0;
@@ -183,7 +186,7 @@ struct State {
     std::uint32_t marks = 0;     // places that are marked: the first ones of `mark`; there are no more than maxMarks
     std::uint32_t markHeld = 0;  // 1: its button is down, 2: that which takes a mark back, 3: both
     std::array<Mark, maxMarks> mark{};
-    std::uint64_t missed = 0;     // ticks
+    std::uint64_t missed = 0;     // ticks; notCounted where nobody counts them
     double tickP99 = 0;           // [s]
     std::uint64_t published = 0;  // CLOCK_MONOTONIC when written [ns]
 };

@@ -49,7 +49,7 @@ endfunction()
 # A program in apps/ with its own install rule.
 function(palpate_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;PRIVATE" ${ARGN})
-  add_executable(${name} ${arg_SOURCES})
+  add_executable(${name} ${arg_SOURCES} ${PROJECT_SOURCE_DIR}/apps/before_main.cpp)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:palpate_flags> ${arg_PRIVATE})
   target_compile_options(${name} PRIVATE ${PALPATE_COLD_OPTIONS})

@@ -65,6 +65,7 @@ std::vector<std::string> deviceNames()
 Arm::Arm(const DeviceParameters& device, const Grip& grip, Vec3 start, double period)
     : device_(device), grip_(grip), period_(period), goal_(start), position_(start)
 {
+    base::failIf(!(device.delay >= 0.0), "device '{}': a delay of {:f} s: must be 0 or more", device.name, device.delay);
     base::failIf(!(device.delay / period < static_cast<double>(longestLine - 2)),
                  "device '{}': a delay of {:f} s is over {} samples: shorten it or sample more slowly", device.name,
                  device.delay, longestLine - 2);

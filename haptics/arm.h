@@ -49,8 +49,8 @@ inline constexpr Grip released{0, 0, 0};
 class Arm {
 public:
     /// @param device  its mechanics    @param grip  of the hand    @param start  where the tip rests and is held [m]
-    /// @param period  between samples [s]. Throws std::runtime_error for a delay that is longer than the line holds (256
-    /// samples).
+    /// @param period  between samples [s]. Throws std::runtime_error for a delay that is negative, or longer than the
+    /// line holds (256 samples).
     explicit Arm(const DeviceParameters& device, const Grip& grip = {}, Vec3 start = Vec3(0.0),
                  double period = tickSeconds);
 

@@ -137,6 +137,7 @@ Broadcast::Broadcast(const std::string& session, const SessionModel& model, std:
 void Broadcast::publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept
 {
     showTick(record, timing, state_, simulation.period());
+    state_.missed = timing.paced ? timing.missed : channel::notCounted;
     state_.standing = channel::Standing::no;
     publisher_.setState(state_);
     if (record.tick % channel::frameTicks == 0) {

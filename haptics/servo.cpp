@@ -10,8 +10,12 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <ctime>
+#include <fstream>
+#include <mutex>
+#include <string>
 
 namespace palpate::haptics {
 
@@ -159,6 +163,47 @@ private:
     int faded_ = 0;  // ticks
 };
 
+// Whether the process has locked memory.
+bool hasLocked()
+{
+    std::ifstream status("/proc/self/status");
+    std::string word;
+    while (status >> word && word != "VmLck:") {
+    }
+    std::uint64_t kilobytes = 0;
+    return status >> kilobytes && kilobytes > 0;
+}
+
+// The lock is the process's, whoever asked for it: one count for all claims.
+class LockedMemory {
+public:
+    // False where it is not permitted; errno says why.
+    bool claim()
+    {
+        const std::lock_guard lock(guard_);
+        kept_ = claims_ > 0 ? kept_ : hasLocked();
+        if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+            return false;
+        }
+        ++claims_;
+        return true;
+    }
+    void release()
+    {
+        const std::lock_guard lock(guard_);
+        if (--claims_ == 0 && !kept_) {
+            munlockall();
+        }
+    }
+
+private:
+    std::mutex guard_;
+    int claims_ = 0;
+    bool kept_ = false;  // somebody else locked it before
+};
+
+LockedMemory lockedMemory;
+
 }  // namespace
 
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
@@ -209,21 +254,27 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
     return timing;
 }
 
-std::vector<std::string> claimRealTime()
+RealTimeClaim::RealTimeClaim()
 {
-    std::vector<std::string> warnings;
     sched_param parameters{};
     parameters.sched_priority = priority;
     if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0) {
         prctl(PR_SET_TIMERSLACK, 1UL);
-        warnings.push_back("no real-time priority (SCHED_FIFO: " + std::string(std::strerror(errno)) +
-                           "): ticks may come late under load; allow it with 'ulimit -r 60' or run as root");
+        warnings_.push_back("no real-time priority (SCHED_FIFO: " + std::string(std::strerror(errno)) +
+                            "): ticks may come late under load; allow it with 'ulimit -r 60' or run as root");
     }
-    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-        warnings.push_back("memory is not locked (mlockall: " + std::string(std::strerror(errno)) +
-                           "): a page fault may delay a tick; allow it with 'ulimit -l unlimited' or run as root");
+    locked_ = lockedMemory.claim();
+    if (!locked_) {
+        warnings_.push_back("memory is not locked (mlockall: " + std::string(std::strerror(errno)) +
+                            "): a page fault may delay a tick; allow it with 'ulimit -l unlimited' or run as root");
     }
-    return warnings;
+}
+
+RealTimeClaim::~RealTimeClaim()
+{
+    if (locked_) {
+        lockedMemory.release();
+    }
 }
 
 }  // namespace palpate::haptics

@@ -43,8 +43,21 @@ using TickSink = std::function<void(const TickRecord&, const ServoTiming&)>;
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
                      const std::atomic<bool>& stop);
 
-/// Gives the calling thread SCHED_FIFO priority and locks the process's memory, where permitted. Returns a sentence for the
-/// user for each that is not.
-std::vector<std::string> claimRealTime();
+/// Gives the calling thread SCHED_FIFO priority and locks the process's memory, where permitted. The memory is locked until
+/// the last claim ends, and stays so where the process itself had locked some before the first; the priority ends with the
+/// thread.
+class RealTimeClaim {
+public:
+    RealTimeClaim();
+    ~RealTimeClaim();
+    RealTimeClaim& operator=(RealTimeClaim&&) = delete;
+
+    /// A sentence for the user for each that is not permitted.
+    const std::vector<std::string>& warnings() const noexcept { return warnings_; }
+
+private:
+    bool locked_ = false;
+    std::vector<std::string> warnings_;
+};
 
 }  // namespace palpate::haptics

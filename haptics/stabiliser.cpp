@@ -40,10 +40,11 @@ bool finite(Vec3 v) noexcept
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Whether cap and period are such that they limit a force.
+// Whether cap, period and delay are such that a force can be limited by them.
 bool isLimiting(const StabiliserOptions& o) noexcept
 {
-    return o.cap >= 0.0 && o.device.peakForce >= 0.0 && o.period > 0.0 && std::isfinite(o.period);
+    return o.device.delay >= 0.0 && std::isfinite(o.device.delay) && o.cap >= 0.0 && o.device.peakForce >= 0.0 &&
+           o.period > 0.0 && std::isfinite(o.period);
 }
 
 // Nothing is sent from now on.
@@ -96,6 +97,19 @@ void account(Vec3 way, const StabiliserOptions& o, EnergyLedger& l) noexcept
     l.given += glm::dot(held.total(), way);
     l.tissue += glm::dot(held.basic + held.damping, way) - frictionShare * o.device.coulomb * glm::length(way);
     l.damped -= glm::dot(held.damping, way);
+}
+
+// The fraction of tissue and damping that may still be sent. The guard below takes the direction of the next way from the
+// last ones; what reverses faster than it acts is out of step with it and gives energy in both directions. The ledger
+// sees that without a direction: the debt grows beyond its worst after the guard has had its time. It counts until all
+// is paid, so that the debt of any poses has a bound.
+double trust(double dt, EnergyLedger& l) noexcept
+{
+    const bool owes = l.tissue > 2.0 * energyAllowed;
+    l.owing = owes ? l.owing + dt : 0.0;
+    l.again = owes ? l.again + (l.owing > guardTime ? std::max(0.0, l.tissue - l.worst) : 0.0) : 0.0;
+    l.worst = owes ? std::max(l.worst, l.tissue) : 0.0;
+    return std::clamp(1.0 - l.again / energyAllowed, 0.0, 1.0);
 }
 
 // The nearest change of force that a tissue of stiffness 0 to `stiffest` could answer the way with.
@@ -316,6 +330,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         // What was put in is not given back any more, and no credit for another place.
         s.ledger.tissue = std::max(s.ledger.tissue, 0.0);
         s.ledger.stored = 0.0;
+        s.ledger.again = 0.0;
     } else {
         const StableLimits limits = stableLimits(o);
         const double slew = slewRate * o.period * cap;
@@ -333,9 +348,10 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         remember(device.position, sent, believed, s.window);
         const Motion motion = motionIn(s.window, o.device.encoder, o.period);
         // So that without additional force the basic one is the same: what that alone asks for, and the rest.
-        sent.damping = leakDamping(motion, motion.basic, o, limits.damping);
-        sent.additional += leakDamping(motion, motion.stiffness, o, limits.damping) - sent.damping;
-        sent.basic *= guardGain(sent.basic, device, motion.velocity, o.period, s);
+        const double trusted = trust(o.period, s.ledger);
+        sent.damping = trusted * leakDamping(motion, motion.basic, o, limits.damping);
+        sent.additional += trusted * leakDamping(motion, motion.stiffness, o, limits.damping) - sent.damping;
+        sent.basic *= trusted * guardGain(sent.basic, device, motion.velocity, o.period, s);
         s.gain = std::clamp(s.gain + (device.fresh && believed ? o.period / rampTime : -o.period / fadeTime), 0.0, 1.0);
         const double size = glm::length(sent.total());
         sent = scaled(s.gain * (size > cap ? cap / size : 1.0), sent);

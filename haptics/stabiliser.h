@@ -77,6 +77,9 @@ struct EnergyLedger {
     double tissue = 0;  // the part of it that tissue and controller gave, less what the device's friction took for sure [J]
     double stored = 0;  // what tissue would give back in an ideal loop [J]
     double damped = 0;  // taken by the controller for the basic force [J]
+    double owing = 0;   // time that tissue has given more than it may [s]
+    double worst = 0;   // and the most that it gave in that time [J]
+    double again = 0;   // by how much that grew when the guard had had its time to act [J]
 };
 
 /// State of stabilise() between ticks.
@@ -103,7 +106,7 @@ struct StabiliserState {
 /// What stands between computed forces and a hand; in this order:
 ///
 /// - Fault: after a force or a pose that is not finite nothing is sent any more; neither after a sum that would not be
-///   finite, nor with a cap or a period that limits nothing (negative, not a number).
+///   finite, nor with a cap, a period or a delay of the device that limits nothing (negative, not a number).
 /// - Virtual coupling: while the force rises faster along the motion than the stable stiffness, it rises at that, as
 ///   through a spring in series, and catches up when the hand is slow or stands still. Below it the force passes unchanged.
 /// - Passivity: a force that is held for a period and comes late gives K v^2 (T / 2 + t_d) more than the tissue would
@@ -111,7 +114,9 @@ struct StabiliserState {
 ///   reference energy following", 2005). What the device's friction does not take of it, a damping force takes. It
 ///   looks at the last milliseconds alone, so it neither saves credit nor acts late. As the last guard, where the tissue
 ///   would end up with 0.4 mJ more than it ever got, its force on the way out is scaled down until that is paid back. While
-///   no fresh pose comes the hand is presumed to move on at its speed, along the force.
+///   no fresh pose comes the hand is presumed to move on at its speed, along the force. Where the debt grows all the same,
+///   ways in and out change faster than the guard can act (a faulty encoder): then tissue and damping end until it is paid,
+///   or until the dead-man switch is let go.
 /// - Gain: rises to 1 in half a second; falls to zero in 50 ms when poses stop being fresh or jump (over 10 m/s); is zero
 ///   while the dead-man switch is up.
 /// - Cap: all parts are scaled together, so that their sum is at most the cap (equation 1).

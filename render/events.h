@@ -24,9 +24,6 @@ enum class EventKind : std::uint8_t {
     finished
 };
 
-/// State::missed of a record that does not say it.
-inline constexpr std::uint64_t notCounted = ~std::uint64_t{0};
-
 /// Something that a trainee or an instructor wants to find again.
 struct Event {
     double time = 0;  // of the session [s]

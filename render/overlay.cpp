@@ -215,8 +215,9 @@ std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& 
 
 void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& state, const Health& health)
 {
-    const std::string brief =
-        state.missed == notCounted ? "" : said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed);
+    const std::string brief = state.missed == channel::notCounted
+                                  ? ""
+                                  : said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed);
     std::string simulation = brief, viewer;
     if (health.tickRate > 0 && state.tickP99 > 0 && !brief.empty())
         simulation = said(tr("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed"), health.tickRate, state.tickP99 * 1e6,

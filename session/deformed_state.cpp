@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace palpate::session {
 
@@ -116,10 +117,10 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
     });
 }
 
-ShownState shownState(const std::string& file, double at, std::optional<std::uint64_t> shapeTick,
+ShownState shownState(const haptics::Record& record, double at, std::optional<std::uint64_t> shapeTick,
                       const std::function<void(double)>& progress)
 {
-    const haptics::Record record(file);
+    const std::string& file = record.file();
     const haptics::SessionModel model = reopenSession(file, record.info());
     const std::uint64_t tick = tickAt(record, file, at);
     const std::uint64_t shape = std::min(shapeTick.value_or(tick / channel::frameTicks * channel::frameTicks), tick);
@@ -140,9 +141,10 @@ ShownState shownState(const std::string& file, double at, std::optional<std::uin
     return shown;
 }
 
-DeformedState::DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
-    : record_(file), model_(reopenSession(file, record_.info()))
+DeformedState::DeformedState(haptics::Record record, double at, const std::function<void(double)>& progress)
+    : record_(std::move(record)), model_(reopenSession(record_.file(), record_.info()))
 {
+    const std::string& file = record_.file();
     const double rate = record_.info().rate;
     tick_ = tickAt(record_, file, at);
     simulation_ = std::make_unique<haptics::Simulation>(model_, haptics::SimulationOptions{1.0 / rate, {}});

@@ -29,19 +29,23 @@ struct ShownState {
     std::unique_ptr<channel::Displaced> shape = std::make_unique<channel::Displaced>();  // the last that was published
 };
 
-/// Computes the record `file` again up to `at` [s]. `shapeTick`: when the displaced nodes were published; nothing: the last
+/// Computes a record again up to `at` [s]. `shapeTick`: when the displaced nodes were published; nothing: the last
 /// publication before `at`. Throws as DeformedState.
-ShownState shownState(const std::string& file, double at, std::optional<std::uint64_t> shapeTick,
+ShownState shownState(const haptics::Record& record, double at, std::optional<std::uint64_t> shapeTick,
                       const std::function<void(double)>& progress);
 
 /// The body of a recorded session at one moment, computed again from the record's poses.
 class DeformedState {
 public:
-    /// @param file      the record
+    /// @param record    or its file
     /// @param at        session time [s]; the last tick that is not later
     /// @param progress  is called with the share that is done; may be empty
     /// Throws std::runtime_error for a time that the record does not have and for forces that are not the record's.
-    DeformedState(const std::string& file, double at, const std::function<void(double)>& progress);
+    DeformedState(haptics::Record record, double at, const std::function<void(double)>& progress);
+    DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
+        : DeformedState(haptics::Record(file), at, progress)
+    {
+    }
 
     DeformedState& operator=(DeformedState&&) = delete;
 

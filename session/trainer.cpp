@@ -142,8 +142,9 @@ struct Trainer::Impl {
     // The servo thread: nothing in the sink allocates, locks or does I/O.
     void servo(std::vector<std::string>& warnings, EndInOrder& untilItsEnd)
     {
+        std::optional<haptics::RealTimeClaim> claim;
         if (options.servo.paced) {
-            warnings = claimRealTime();
+            warnings = claim.emplace().warnings();
         }
         options.servo.pause.asked = [this, &untilItsEnd] {
             const auto input = broadcast.input();

@@ -145,6 +145,8 @@ struct Errands::Impl {
         if (state.person != before) {
             choosePerson(state);
             state.screen == Screen::progress ? static_cast<void>(goBack(state)) : void();
+            // Of a session without a record nothing can be seen again.
+            state.screen == Screen::result ? static_cast<void>(dropErased(state.files, state.result, false)) : void();
         }
     }
     void changeHand(State& state)

@@ -109,6 +109,17 @@ bool liesBetween(const Spread& s)
 
 }  // namespace
 
+std::string inWords(const Spread& s, int decimals)
+{
+    if (!std::isfinite(s.median) && !std::isfinite(s.lower) && !std::isfinite(s.upper)) {
+        return tr("no value");
+    }
+    const auto number = [decimals](double v) {
+        return std::isfinite(v) ? said("{:.{}Lf}", base::printable(v, decimals), decimals) : "-";
+    };
+    return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
+}
+
 std::vector<LiveSession> liveIn(const json& figures)
 {
     std::vector<LiveSession> all;

@@ -31,6 +31,9 @@ struct Spread {
     std::vector<double> values;               // finite ones
 };
 
+/// "12.3 (10.1 to 14.0)", with "-" for what is infinite, or in words that there is nothing.
+std::string inWords(const Spread& spread, int decimals);
+
 /// A measure in all groups.
 struct ComparedMeasure {
     std::string label, unit;

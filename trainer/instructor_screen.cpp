@@ -221,14 +221,6 @@ Errand drawChoiceOfGroups(State& state)
     return compare || i.asPage ? Errand::compareGroups : Errand::none;
 }
 
-std::string spreadInWords(const Spread& s, int decimals)
-{
-    const auto number = [decimals](double v) {
-        return std::isfinite(v) ? said("{:.{}Lf}", base::printable(v, decimals), decimals) : "-";
-    };
-    return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
-}
-
 void drawDifferences(const Comparison& c)
 {
     const float em = ImGui::GetFontSize();
@@ -252,7 +244,7 @@ void drawDifferences(const Comparison& c)
         words(m.unit.empty() ? m.label : m.label + " [" + m.unit + "]");
         for (std::size_t g = 0; g < 2; ++g) {
             ImGui::TableNextColumn();
-            words(spreadInWords(m.groups[g], m.decimals), groupColour(g));
+            words(inWords(m.groups[g], m.decimals), groupColour(g));
         }
         ImGui::TableNextColumn();
         words(m.effect ? said("{:+.2Lf}", base::printable(*m.effect, 2)) : "-");

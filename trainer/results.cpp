@@ -172,7 +172,7 @@ Result readResult(const fs::path& figures)
     return result;
 }
 
-bool dropErased(const SessionFiles& files, Result& result)
+bool dropErased(const SessionFiles& files, Result& result, bool ran)
 {
     std::error_code failed;
     if (!result.problem.empty() || fs::exists(files.record, failed)) {
@@ -180,7 +180,9 @@ bool dropErased(const SessionFiles& files, Result& result)
     }
     fs::remove(files.figures, failed);
     result = {};
-    result.problem = tr("The profile was erased while this session ran, and its record with it: nothing of it is kept.");
+    result.problem =
+        ran ? tr("The profile was erased while this session ran, and its record with it: nothing of it is kept.")
+            : tr("The profile was erased, and the record of this session with it: nothing of it is kept.");
     return true;
 }
 

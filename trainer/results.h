@@ -12,7 +12,8 @@ namespace palpate::trainer {
 Result readResult(const std::filesystem::path& figures);
 /// A person who was erased while the session ran has lost its record, and is to leave no figures: removes them, and says it
 /// in place of a result. False where the record is there, or there is no score.
-bool dropErased(const SessionFiles& files, Result& result);
+/// @param ran  the session still ran then; else it was over, and its result was shown
+bool dropErased(const SessionFiles& files, Result& result, bool ran = true);
 /// What `palpate devices --json` wrote.
 DeviceCheck readDevices(const std::filesystem::path& figures);
 

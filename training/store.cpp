@@ -243,6 +243,9 @@ Person ProfileStore::add(const std::string& name, Hand hand)
     checkProfileName(name);
     for (const Person& one : people()) {
         base::failIf(one.name == name, "{}: there is a profile of this name already", name);
+        base::failIf(isSameButForCase(one.name, name),
+                     "{}: there is a profile '{}' already, which differs only in capital letters: choose another name",
+                     name, one.name);
     }
     return guarded(file_, [&] {
         Statement(*database_, "INSERT INTO person (name, hand, created) VALUES (?, ?, ?)", name, nameOf(hand), base::utc())

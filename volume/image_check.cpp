@@ -12,19 +12,22 @@ namespace palpate::volume {
 namespace {
 
 // Of the corner of the grid that is farthest from the origin of the patient frame [m].
-double reachOf(const LabelImage& image)
+double reachOf(Index3 size, const Affine& affine)
 {
     double reach = 0;
     for (int corner = 0; corner < 8; ++corner) {
         const Vec3 side(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
-        reach = std::max(reach, glm::length(image.affine.toPatient(side * Vec3(image.size) - 0.5)));
+        reach = std::max(reach, glm::length(affine.toPatient(side * Vec3(size) - 0.5)));
     }
     return reach;
 }
 
-void checkPlace(const LabelImage& image)
+}  // namespace
+
+void checkGrid(Index3 size, const Affine& affine)
 {
-    const Affine& affine = image.affine;
+    base::failIf(size.x < 1 || size.y < 1 || size.z < 1, "a label map of {} x {} x {} voxels is empty", size.x, size.y,
+                 size.z);
     const Vec3 s = affine.spacing();
     const double volume = affine.voxelVolume();
     base::failIf(
@@ -35,15 +38,13 @@ void checkPlace(const LabelImage& image)
                  "a label map's voxels are {:g} x {:g} x {:g} mm: that is no patient, check the units of its affine",
                  1e3 * s.x, 1e3 * s.y, 1e3 * s.z);
     base::failIf(volume < 1e-6 * s.x * s.y * s.z, "a label map's voxels have no volume: its directions are dependent");
-    if (const double reach = reachOf(image); reach >= farthestPlace) {
+    if (const double reach = reachOf(size, affine); reach >= farthestPlace) {
         throw base::error(
             "a label map reaches {:g} m from the origin of the patient frame, and {:g} m is the most: check the "
             "units of its affine, or move its origin",
             reach, farthestPlace);
     }
 }
-
-}  // namespace
 
 double shearOf(const Affine& affine) noexcept
 {
@@ -57,12 +58,10 @@ double shearOf(const Affine& affine) noexcept
 
 void checkImage(const LabelImage& image)
 {
-    base::failIf(image.size.x < 1 || image.size.y < 1 || image.size.z < 1, "a label map of {} x {} x {} voxels is empty",
-                 image.size.x, image.size.y, image.size.z);
+    checkGrid(image.size, image.affine);
     base::failIf(image.values.size() != image.offset({0, 0, image.size.z}),
                  "a label map of {} x {} x {} voxels has {} values", image.size.x, image.size.y, image.size.z,
                  image.values.size());
-    checkPlace(image);
 }
 
 }  // namespace palpate::volume

@@ -12,9 +12,11 @@ inline constexpr double maxShear = 2e-3;        // cosine between voxel axes; be
 /// Largest departure of two voxel axes from a right angle [rad].
 double shearOf(const Affine& affine) noexcept;
 
-/// Throws std::runtime_error for a label map that can be no body: without voxels or with another number of values, with
-/// numbers that are not finite, voxels without volume or of no patient's size, and places beyond farthestPlace. Axes may be
-/// sheared.
+/// Throws std::runtime_error for voxels that can be of no body: none of them, places that are not finite or beyond
+/// farthestPlace, and voxels without volume or of no patient's size. Axes may be sheared.
+void checkGrid(Index3 size, const Affine& affine);
+
+/// The same for a label map, and for one with another number of values.
 void checkImage(const LabelImage& image);
 
 }  // namespace palpate::volume

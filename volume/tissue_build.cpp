@@ -1,7 +1,7 @@
 #include <base/error.h>
 #include <volume/image_check.h>
-#include <volume/law.h>
 #include <volume/runs.h>
+#include <volume/table_check.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -130,33 +130,6 @@ typename Grid::Ptr gridOf(const LabelImage& image, const ValueAt& valueAt, typen
     openvdb::tools::pruneTiles(tree);
     grid->setTransform(transformOf(image.affine));
     return grid;
-}
-
-// What no force can be computed from. datasets/ asks for more of a table in a file.
-void checkRow(const std::string& table, const TissueRow& row)
-{
-    const double e = row.youngsModulus;
-    const bool isSolid = row.role != Role::air;
-    base::failIf(
-        !std::isfinite(e) || e < 0.0 || (isSolid && e == 0.0),
-        "tissue table '{}': tissue '{}': Young's modulus is {:g} kPa: must be a positive number; only air has none", table,
-        row.name, 1e-3 * e);
-    base::failIf(!(row.poissonRatio >= 0.0 && row.poissonRatio < 0.5),
-                 "tissue table '{}': tissue '{}': Poisson's ratio is {:g}: must be 0 to below 0.5", table, row.name,
-                 row.poissonRatio);
-    base::failIf(!(row.stiffening >= minStiffening && row.stiffening <= maxStiffening),
-                 "tissue table '{}': tissue '{}': stiffening is {:g}: must be {:g} to {:g}", table, row.name,
-                 row.stiffening, minStiffening, maxStiffening);
-}
-
-void checkTable(const TissueTable& table)
-{
-    base::failIf(table.rows.empty() || table.rows.front().role != Role::air,
-                 "tissue table '{}': row 0 must be air, the outside", table.name);
-    base::failIf(table.rows.size() > 256, "tissue table '{}' has {} rows; 256 is the most", table.name, table.rows.size());
-    for (const TissueRow& row : table.rows) {
-        checkRow(table.name, row);
-    }
 }
 
 std::uint8_t rowOf(const TissueTable& table, const LabelName& label)

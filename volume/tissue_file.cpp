@@ -1,4 +1,6 @@
 #include <base/mapped.h>
+#include <volume/image_check.h>
+#include <volume/table_check.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -11,6 +13,7 @@
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Stream.h>
+#include <glm/vector_relational.hpp>
 #include <nlohmann/json.hpp>
 
 #include <unistd.h>
@@ -187,7 +190,13 @@ void readStructures(const json& list, TissueData& t)
             t.structures.back().colour = j.at("colour").get<std::array<std::uint8_t, 3>>();
         }
         t.structures.back().terminology = j.value("terminology", "");
-        t.extents.push_back({j.at("low").get<Index3>(), j.at("high").get<Index3>()});
+        const IndexBox extent{j.at("low").get<Index3>(), j.at("high").get<Index3>()};
+        const auto isIn = [&](Index3 n) {
+            return glm::all(glm::greaterThanEqual(n, Index3(0))) && glm::all(glm::lessThan(n, t.size));
+        };
+        base::failIf(extent.empty() || !isIn(extent.low) || !isIn(extent.high),
+                     "structure '{}' lies outside of the voxels: it is damaged, make it again", t.structures.back().name);
+        t.extents.push_back(extent);
     }
 }
 
@@ -203,6 +212,8 @@ void readDescription(const json& j, TissueData& t)
     t.table.name = j.at("table").at("name").get<std::string>();
     t.table.rows = base::mapped<TissueRow>(j.at("table").at("rows"), rowFrom);
     t.provenance = j.at("provenance").get<Provenance>();
+    checkGrid(t.size, t.affine);
+    checkTable(t.table);
     readStructures(j.at("structures"), t);
     if (j.contains("image")) {
         const json& image = j.at("image");

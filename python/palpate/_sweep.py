@@ -54,6 +54,8 @@ def plan_of(scene, cases, *, procedure="press", outputs=None, repeats=1, seed=1,
     rows = _rows(cases)
     if not isinstance(procedure, (str, collections.abc.Mapping)):
         raise TypeError(f"sweep: procedure: give one of {', '.join(sweep_outputs())}, or a dictionary with its keys, not {procedure!r}")
+    if outputs is not None and not isinstance(outputs, collections.abc.Iterable):
+        raise TypeError(f"sweep: outputs: give the name of an output, or a list of them (sweep_outputs() has them), not {outputs!r}")
     procedure = {"kind": procedure} if isinstance(procedure, str) else dict(procedure)
     plan = {"scene": os.fspath(scene), "seed": seed, "repeats": repeats, "records": records}
     if outputs is not None:

@@ -6,8 +6,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -307,13 +305,12 @@ void inRealTime(Run&& run)
 {
     std::exception_ptr problem;
     std::thread thread([&] {
-        claimRealTime();
+        const RealTimeClaim claim;
         try {
             run();
         } catch (...) {
             problem = std::current_exception();
         }
-        munlockall();
     });
     thread.join();
     if (problem) {

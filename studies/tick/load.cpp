@@ -17,6 +17,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -47,8 +48,9 @@ Run runBeside(const haptics::SessionModel& model, bool realTime)
 {
     Run run;
     std::thread servo([&] {
+        std::optional<haptics::RealTimeClaim> claim;
         if (realTime) {
-            run.warnings = haptics::claimRealTime();
+            run.warnings = claim.emplace().warnings();
         }
         run.realTime = sched_getscheduler(0) == SCHED_FIFO;
         run.timing = benchTick(model, {true, sessionSeconds, 0}).all;

@@ -90,7 +90,8 @@ class ServoBeside {
 public:
     explicit ServoBeside(const haptics::SessionModel& model)
         : thread_([this, &model] {
-              warnings = haptics::claimRealTime();
+              const haptics::RealTimeClaim claim;
+              warnings = claim.warnings();
               do {
                   timing = benchTick(model, {true, 0.0, 0}).all;
                   lateness.push_back(timing.lateness.percentiles().p99);

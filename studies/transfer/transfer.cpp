@@ -127,7 +127,7 @@ public:
         if (id_ == 0) {
             // Whatever happens, this copy of the program runs no further.
             try {
-                claimRealTime();
+                const RealTimeClaim claim;
                 if (options.transport == Transport::sharedMemory) {
                     receiveByMemory(session, options.setUp, *seen_);
                 } else {
@@ -212,7 +212,7 @@ std::uint64_t runPaced(session::Session& session, double seconds, const TickSink
     HandDevice hand = handBefore(session.simulation().model(), startDistance);
     std::uint64_t ticks = 0;
     std::thread servo([&] {
-        claimRealTime();
+        const RealTimeClaim claim;
         ticks = session.run(hand, {.servo = {true, seconds, 0}}, sink).ticks;
     });
     servo.join();

@@ -27,6 +27,22 @@ TEST(CommandLine, EveryCommandExplainsItself)
     EXPECT_EQ(palpate({"help", "bench", "tick"}).out, palpate({"bench", "tick", "--help"}).out);
 }
 
+// Libraries start their threads before main(): the program was aborted.
+TEST(CommandLine, WithoutThreadsItSaysSoOnOneLine)
+{
+    // The limit does not hold for root.
+    const std::string limited =
+        "palpate=$1; shift; if [ \"$(id -u)\" = 0 ]; then exec setpriv --reuid=65534 --regid=65534 "
+        "--clear-groups prlimit --nproc=1 \"$palpate\" \"$@\"; fi; "
+        "ulimit -u 1; exec \"$palpate\" \"$@\"";
+    const Outcome outcome =
+        Program("/bin/bash", {"-c", limited, "bash", PALPATE_BIN_DIR "/palpate", "info", "--help"}).wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(outcome.err,
+              "palpate: no thread can be started (Resource temporarily unavailable): end other programs, or "
+              "allow more (ulimit -u)\n");
+}
+
 TEST(CommandLine, VersionSaysBuildKernelSetsAndLibraries)
 {
     const Outcome said = palpate({"--version"});

@@ -147,6 +147,15 @@ TEST_F(ImportOptions, FiguresAndMapsReplaceNothingThatIsReadOrEdited)
     const std::string figures = write("masks/figures.json", "{}");
     EXPECT_EQ(palpate(import(pair, with({"--json", figures}))).status, 0);
     EXPECT_EQ(palpate(import(pair, with({"--json", figures}))).status, 0) << "figures of before are replaced";
+    // In a folder that is read only its own figures are.
+    writeText(mask, metaImage<std::uint8_t>("MET_UCHAR", {1, 1, 1}));
+    const std::string masks = folder / "masks", own = folder / "masks/own.json";
+    expectRefusal(import(masks, {"--set", "a=fat", "--json", write("masks/notes.json", R"({"labels": 3})")}),
+                  "no import wrote it");
+    EXPECT_EQ(readText(folder / "masks/notes.json"), R"({"labels": 3})");
+    for (int i = 0; i < 2; ++i) {
+        EXPECT_EQ(palpate(import(masks, {"--set", "a=fat", "--json", own})).err, "");
+    }
     const std::string map = folder / "m.toml";
     EXPECT_EQ(palpate({"import", one, "--write-map", map}).status, 0);
     writeText(map, "edited");

@@ -347,5 +347,27 @@ TEST_F(Researcher, ASceneIsProposedRunsAndItsStatesAreExported)
     expectRefusal({"scene", vdb, "--lesion-in", "Aorta", "--lesion", "30mm", "-o", scene}, "has no room");
 }
 
+// What is named takes the place of what the volume's roles say.
+TEST_F(Researcher, VitalStructuresAreThoseThatAreNamed)
+{
+    ASSERT_EQ(palpate({"import", seg, "-o", vdb, "--add-skin", "3mm", "--pad", "10mm"}).status, 0);
+    const std::string scene = folder / "biopsy.toml";
+    const auto vitalOf = [&](const std::string& names) {
+        std::vector<std::string> words{"scene", vdb, "--target", "Aorta", "-o", scene};
+        names.empty() ? void() : static_cast<void>(words.insert(words.end(), {"--vital", names}));
+        const auto named = figures(words).at("vital").get<std::vector<std::string>>();
+        EXPECT_EQ(readText(scene).find("name = \"Left lesion\"") != std::string::npos, !names.empty());
+        return named;
+    };
+    EXPECT_EQ(vitalOf("Left lesion"), std::vector<std::string>{"Left lesion"});
+    EXPECT_NE(vitalOf(""), std::vector<std::string>{"Left lesion"});
+    const auto refused = [&](const std::string& names, const std::string& why) {
+        expectRefusal({"scene", vdb, "--target", "Left lesion", "--vital", names, "-o", scene}, why);
+    };
+    refused("spleen", "--vital spleen: the volume has no structure or tissue of this name");
+    refused("Aorta,Aorta", "--vital Aorta: is named twice: leave it out");
+    refused("Left lesion", "--vital Left lesion: is the target: leave it out");
+}
+
 }  // namespace
 }  // namespace palpate::apps

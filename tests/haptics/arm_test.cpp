@@ -171,6 +171,10 @@ TEST(Arm, UnknownDevicesAndEndlessDelaysAreRefused)
     DeviceParameters slow = massOf(0.1);
     slow.delay = 0.3;
     EXPECT_NE(tests::errorOf([&] { Arm arm(slow); }).find("delay"), std::string::npos);
+    for (const double delay : {-1e-3, std::numeric_limits<double>::quiet_NaN()}) {
+        slow.delay = delay;
+        EXPECT_NE(tests::errorOf([&] { Arm arm(slow); }).find("must be 0 or more"), std::string::npos);
+    }
 }
 
 TEST(Arm, AllocatesNothing)

@@ -12,20 +12,68 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <type_traits>
 #include <vector>
 
 namespace palpate::haptics {
 namespace {
+
+// Memory that this process has locked [kB].
+double lockedMemory()
+{
+    std::ifstream status("/proc/self/status");
+    std::string word;
+    while (status >> word && word != "VmLck:") {
+    }
+    double kilobytes = -1;
+    status >> kilobytes;
+    return kilobytes;
+}
+
+// A host of sessions had all its memory locked for good. Where locking is not permitted nothing is ever locked.
+TEST(RealTimeClaim, MemoryIsLockedUntilTheLastClaimEnds)
+{
+    std::thread([] {
+        const auto lockedByOne = [] {
+            const RealTimeClaim claim;
+            return lockedMemory() > 0;
+        };
+        ASSERT_EQ(lockedMemory(), 0);
+        ::mlockall(MCL_CURRENT | MCL_FUTURE);
+        const bool may = lockedMemory() > 0;  // nor with a sanitizer
+        ::munlockall();
+        EXPECT_EQ(lockedByOne(), may);
+        EXPECT_EQ(lockedMemory(), 0);
+        auto first = std::make_unique<RealTimeClaim>();
+        auto second = std::make_unique<RealTimeClaim>();
+        first.reset();
+        EXPECT_EQ(lockedMemory() > 0, may);
+        second.reset();
+        EXPECT_EQ(lockedMemory(), 0);
+        if (may) {
+            // What the host locked by itself stays.
+            const auto page = std::make_unique<std::array<char, 16384>>();
+            ASSERT_EQ(::mlock(page->data(), page->size()), 0);
+            lockedByOne();
+            EXPECT_GT(lockedMemory(), 0);
+            ::munlockall();
+        }
+    }).join();
+}
 
 std::vector<datasets::TraineeStep> waitFor(double seconds)
 {
@@ -303,6 +351,24 @@ TEST(Broadcast, ViewerSeesTheStateAndTheDisplacedNodes)
     }
     broadcast.finish();
     EXPECT_EQ(viewer->state()->status, channel::Status::finished);
+}
+
+// Without a clock no tick is late, which is not "0 missed".
+TEST(Broadcast, MissedTicksAreCountedAgainstTheClockOnly)
+{
+    for (const bool paced : {true, false}) {
+        const std::string session = "test-paced-" + std::to_string(getpid());
+        Rig rig;
+        Broadcast broadcast(session, tests::blockSphere());
+        const auto viewer = channel::Subscriber::attach(session);
+        ASSERT_TRUE(viewer.has_value());
+        runServo(
+            rig.hand, rig.simulation, {paced, 0.02},
+            [&](const TickRecord& r, const ServoTiming& timing) { broadcast.publish(r, timing, rig.simulation); },
+            rig.stop);
+        ASSERT_TRUE(viewer->state().has_value());
+        EXPECT_EQ(viewer->state()->missed == channel::notCounted, !paced);
+    }
 }
 
 // 31 bytes are there for it; a letter of two bytes is there whole or not at all.

@@ -83,7 +83,7 @@ class Sweeps(InFolder):
 
     def test_arguments_that_are_none_are_said_by_name(self):
         for wrong, keys in (("sweep: procedure: give one of .*press", {"procedure": None}), ("has no argument 'output'", {"output": "force_n"}),
-                            ("has no argument 'repeat'.* repeats", {"repeat": 2})):
+                            ("has no argument 'repeat'.* repeats", {"repeat": 2}), ("sweep: outputs: give .* list .*not 3", {"outputs": 3})):
             with self.subTest(wrong), self.assertRaisesRegex(TypeError, wrong):
                 palpate.sweep("block", [{"tissue.fat.youngs_kpa": 4.0}], **keys)
 

@@ -397,7 +397,7 @@ TEST_F(PictureTest, ARecordsEventsAndScansAreOfTheirOwnTime)
     channel::State state = storyState(scenery, 1.4);
     state.tick = 1400;
     state.pictures = 1;
-    state.missed = notCounted;
+    state.missed = channel::notCounted;
     std::string words;
     for (const auto& [layout, name] : layouts) {
         picture.show(layout);

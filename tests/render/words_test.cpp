@@ -137,7 +137,7 @@ TEST_F(WordsTest, OfHealthAreOnlyWhatIsKnown)
     Picture& picture = studio->picture();
     studio->take(1.0, Layout::trainee, true);
     channel::State state = storyState(studio->scenery, 1.0);
-    state.missed = notCounted;
+    state.missed = channel::notCounted;
     for (const auto& [delay, words] : {std::pair{0.02, "30 frames/s, 20 ms behind"}, {0.0, "30 frames/s"}}) {
         picture.update(state, nullptr, {30, delay, 1000});
         picture.render(Quality::still);

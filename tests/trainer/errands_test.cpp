@@ -208,10 +208,16 @@ TEST(Errands, WhoWasErasedElsewhereIsGone)
     putIntoGroup(state, "ada", 1);
     putIntoGroup(state, "bert", 2);
     errands.run(Errand::compareGroups, state);
+    // The result of a session is shown; its record goes with the profile.
+    state.files = {folder / "a.db", folder / "a.json"};
+    std::ofstream(state.files.record) << "r";
+    state.screen = Screen::result;
+    ASSERT_EQ(debrief(state), Errand::startDebrief);
     EXPECT_EQ(state.notice, "That did not work:\npalpate: ada: is not there");
     errands.look(state);
     EXPECT_EQ(state.people.size(), 2U);
     offer(bert);
+    std::filesystem::remove(state.files.record);
     std::filesystem::last_write_time(profilesFile(),
                                      std::filesystem::last_write_time(profilesFile()) + std::chrono::seconds(1));
     EXPECT_TRUE(errands.look(state));
@@ -219,6 +225,8 @@ TEST(Errands, WhoWasErasedElsewhereIsGone)
     EXPECT_EQ(state.people.size(), 1U);
     EXPECT_EQ(state.person, "");
     EXPECT_EQ(groupOf(state.instructor, "ada"), 0);
+    EXPECT_NE(state.result.problem.find("The profile was erased, and the record"), std::string::npos);
+    EXPECT_EQ(debrief(state), Errand::none);
 }
 
 TEST(Errands, AKeptNoteIsNoDraftThoughANewerSessionHasEnded)

@@ -118,6 +118,10 @@ TEST(Instructor, MeasuresThatDoNotDifferAreNotCompared)
     EXPECT_TRUE(std::isinf(c.measures[0].groups[0].upper)) << "more than a quarter have no value";
     EXPECT_EQ(c.measures[0].groups[0].values.size(), 1U);
     EXPECT_EQ(c.sessions[0], 2);
+    constexpr double none = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(inWords({2, 1.5, 3, {}}, 1), "2.0 (1.5 to 3.0)");
+    EXPECT_EQ(inWords({2, 1.5, none, {}}, 1), "2.0 (1.5 to -)");
+    EXPECT_EQ(inWords({none, none, none, {}}, 1), "no value") << "it was \"- (- to -)\"";
 }
 
 // As the page has it: what is printed alike is the same, and so is having no value; a value that some lack is not.

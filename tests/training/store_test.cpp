@@ -92,6 +92,13 @@ TEST(ProfileStore, RefusesNamesThatAreNone)
     ProfileStore store(folder / "p.db");
     store.add("anna", Hand::right);
     EXPECT_NE(errorOf([&] { store.add("anna", Hand::right); }).find("already"), std::string::npos);
+    store.add("Jörg Ünal", Hand::right);
+    store.add("Ελένη Жук", Hand::right);
+    for (const char* name : {"Anna", "ANNA", "jörg Ünal", "JÖRG ÜNAL", "ΕΛΈΝΗ ЖУК"}) {
+        EXPECT_NE(errorOf([&] { store.add(name, Hand::right); }).find("differs only in capital letters"), std::string::npos)
+            << name;
+    }
+    EXPECT_EQ(errorOf([&] { store.add("Jorg Unal", Hand::right); }), "") << "another letter";
     EXPECT_NE(errorOf([&] { store.add("", Hand::right); }).find("1 to 100 bytes"), std::string::npos);
     EXPECT_NE(errorOf([&] { store.add("a\nb", Hand::right); }).find("one line"), std::string::npos);
     for (const char* const name : {"  ", " bert", "bert "}) {

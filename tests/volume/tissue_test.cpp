@@ -121,6 +121,40 @@ TEST_F(TissueFile, WhatIsNotOursIsRefusedInOneLine)
 }
 
 // A limit on the size of files stands for a full disk: the write fails in the middle.
+// Numbers of a file that was changed: forces were computed from them, or places outside of the voxels read.
+TEST_F(TissueFile, NumbersThatNoTextMayHaveAreRefusedInOneLine)
+{
+    const fs::path good = folder / "good.vdb", bad = folder / "bad.vdb";
+    Tissue::fromLabels(randomImage(3), table(), names(), {}).save(good);
+    std::ifstream in(good, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    struct Change {
+        std::string key, value, words;
+    };
+    for (const auto& [key, value, words] :
+         std::vector<Change>{{"poisson", "0.9", "Poisson's ratio is 0.9"},
+                             {"youngs_pa", "-9", "Young's modulus"},
+                             {"puncture_n", "-1", "force of puncture"},
+                             {"opacity", "9.", "opacity is 9: must be a number of 0 to 1"},
+                             {"compress", "-1", "shortest link"},
+                             {"size", "[0", "is empty"},
+                             {"high", "[99", "lies outside of the voxels"}}) {
+        // The number behind the last such key, in as many bytes.
+        std::string changed = bytes;
+        const std::size_t at = changed.rfind("\"" + key + "\":") + key.size() + 3;
+        ASSERT_NE(at, std::string::npos + key.size() + 3) << key;
+        const std::size_t end = changed.find_first_of(",}]", at);
+        ASSERT_GE(end - at, value.size()) << key << changed.substr(at, 20);
+        std::string number = value;
+        number.insert(value.size(), end - at - value.size(), value.find('.') == std::string::npos ? ' ' : '0');
+        changed.replace(at, end - at, number);
+        std::ofstream(bad, std::ios::binary) << changed;
+        const std::string why = tests::errorOf([&] { Tissue::load(bad); });
+        EXPECT_TRUE(why.starts_with(bad.string() + ": ") && why.find(words) != std::string::npos) << key << why;
+        EXPECT_EQ(why.find('\n'), std::string::npos);
+    }
+}
+
 TEST_F(TissueFile, AFullDiskLeavesTheOldFile)
 {
     const fs::path file = folder / "kept.vdb";
