@@ -5,6 +5,7 @@
 #include <base/outputs.h>
 #include <base/user_files.h>
 #include <base/utc.h>
+#include <base/words.h>
 #include <training/progress.h>
 
 #include <fmt/chrono.h>
@@ -138,11 +139,13 @@ Conclusion Training::keep(const haptics::SessionInfo& info, const session::Sessi
                 {},
                 {}};
     }
+    const base::English terminal;  // also where the window has another language
     constexpr std::size_t shown = 3;
     std::vector<std::string> lines;
-    for (std::size_t i = 0; i < std::min(shown, figures.losses.size()); ++i) {
-        if (figures.losses[i].points > haptics::toldPoints) {
-            lines.push_back(haptics::inWords(figures.losses[i]));
+    const std::vector<haptics::Loss>& losses = figures.lossesInEnglish;
+    for (std::size_t i = 0; i < std::min(shown, losses.size()); ++i) {
+        if (losses[i].points > haptics::toldPoints) {
+            lines.push_back(haptics::inWords(losses[i]));
         }
     }
     const training::Values values = training::valuesOf(figures.score);

@@ -5,6 +5,7 @@
 
 #include <libintl.h>
 
+#include <atomic>
 #include <clocale>
 #include <cstdlib>
 #include <utility>
@@ -49,6 +50,7 @@ std::string asked()
 }
 
 thread_local bool isEnglish = false;
+std::atomic<bool> chosen = false;  // a language, by useLanguage()
 
 }  // namespace
 
@@ -61,6 +63,7 @@ English::~English()
 
 void useLanguage(const std::string& language, const fs::path& folder)
 {
+    chosen = true;
     const std::string wanted = language.empty() ? asked() : language;
     const bool none = wanted == "C" || wanted == "POSIX" || wanted == "en";
     ::setenv("LANGUAGE", none ? "en" : wanted.c_str(), 1);
@@ -73,7 +76,7 @@ void useLanguage(const std::string& language, const fs::path& folder)
 
 std::string language()
 {
-    return isEnglish ? "en" : asked();
+    return isEnglish || !chosen ? "en" : asked();
 }
 
 const char* tr(const char* text) noexcept

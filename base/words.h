@@ -13,7 +13,7 @@ namespace palpate::base {
 /// @param folder    of the translations (.../locale); empty: beside the program, as built or installed
 void useLanguage(const std::string& language = {}, const std::filesystem::path& folder = {});
 
-/// The language in use: "en", "de".
+/// The language in use: "en", "de". English before useLanguage(): commands have no other.
 std::string language();
 
 /// The text in the user's language (gettext); the text itself where there is none.

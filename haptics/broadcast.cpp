@@ -51,7 +51,7 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
                                const volume::NodeGrid& display, const std::string& who)
 {
     Showing s = showingOf(model, viewersHand, display);
-    s.scenery.who = nameOf(who);
+    s.scenery.who = shownNameOf(who);
     return {session, s.scenery, s.labels, s.image, s.fine};
 }
 

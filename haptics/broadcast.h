@@ -12,7 +12,7 @@ namespace palpate::haptics {
 
 /// The segment of a session, with its scenery. Throws std::runtime_error when it cannot be made.
 /// @param viewersHand  who holds the tool, see channel::handIsViewers
-/// @param who          a name or a pseudonym, of which viewers see the first 31 bytes; empty: not known
+/// @param who          a name or a pseudonym, of which viewers see the first 31 bytes, with an ellipsis; empty: not known
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model,
                                std::uint32_t viewersHand = channel::handElsewhere, const std::string& who = {});
 /// The same with the body's tissues, and the image if it has one, sampled on `display`.

@@ -12,17 +12,41 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string_view>
 
 namespace palpate::haptics {
 
-channel::Name nameOf(const std::string& text) noexcept
+namespace {
+
+// The first bytes of a text, of UTF-8 whole characters. Returns how many.
+std::size_t beginOf(const std::string& text, std::size_t most, channel::Name& name) noexcept
 {
-    channel::Name name{};
-    std::size_t bytes = std::min(text.size(), name.size() - 1);
+    std::size_t bytes = std::min(text.size(), most);
     while (bytes > 0 && bytes < text.size() && !base::beginsCharacter(text[bytes])) {
         --bytes;
     }
     std::copy_n(text.begin(), bytes, name.begin());
+    return bytes;
+}
+
+}  // namespace
+
+channel::Name nameOf(const std::string& text) noexcept
+{
+    channel::Name name{};
+    beginOf(text, name.size() - 1, name);
+    return name;
+}
+
+channel::Name shownNameOf(const std::string& text) noexcept
+{
+    constexpr std::string_view ellipsis = "\u2026";
+    channel::Name name{};
+    if (text.size() < name.size()) {
+        return nameOf(text);
+    }
+    const std::size_t bytes = beginOf(text, name.size() - 1 - ellipsis.size(), name);
+    std::ranges::copy(ellipsis, name.begin() + static_cast<std::ptrdiff_t>(bytes));
     return name;
 }
 

@@ -25,6 +25,8 @@ inline channel::Triple triple(Vec3 v) noexcept
 
 /// The first 31 bytes of a text, of UTF-8 whole characters.
 channel::Name nameOf(const std::string& text) noexcept;
+/// The same, with an ellipsis at the end of what is not whole: for names that nobody looks up.
+channel::Name shownNameOf(const std::string& text) noexcept;
 
 /// The grid that a viewer's labels are on where nobody asks for another.
 volume::NodeGrid displayGrid(const volume::Tissue& tissue);

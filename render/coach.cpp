@@ -20,7 +20,6 @@ constexpr double atRim = 3e-3;       // from the target's surface: near enough t
 constexpr double offLine = 3e-3;     // of tip from planned line that is told [m]
 constexpr double restFor = 3.0;      // on the skin, where no more is asked for [s]
 constexpr double restForce = 2.0;    // force of such a rest [N]
-constexpr double hit = 0.1;          // fraction of target in a core that is worth taking out
 constexpr double offMiddle = 1e-3;   // of the needle's line from the target's middle that is told [m]
 constexpr double refusalSaid = 2.0;  // that the gun did not fire [s]
 constexpr double stopSaid = 4.0;     // that bone stopped its throw [s]
@@ -135,7 +134,7 @@ Coaching approach(const channel::Scenery& scenery, const channel::State& state, 
 
 Coaching biopsy(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
 {
-    if (state.cores == 0 || state.bestTarget < hit)
+    if (state.cores == 0 || !isEnough(state.bestTarget))
         return approach(scenery, state, view);
     if (state.phase != channel::Phase::free)
         return {5, 5,
@@ -248,6 +247,12 @@ Coaching coachTask(const channel::Scenery& scenery, const channel::State& state,
 }
 
 }  // namespace
+
+bool isEnough(double target) noexcept
+{
+    constexpr double half = 50;  // [%]
+    return std::round(100 * target) >= half;
+}
 
 Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
 {

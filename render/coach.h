@@ -26,12 +26,17 @@ struct CoachView {
     bool scanned = false;       // the ultrasound picture is shown, where the other mouse button moves the probe
 };
 
+/// Whether so much target in a core ends a biopsy: half of it, as briefings ask for and as the score has all points for
+/// (docs/score.md), in whole per cent as it is shown.
+/// @param target  fraction
+bool isEnough(double target) noexcept;
+
 /// The step that the session is at: of a touch or an advance where the scene asks for that, else of a biopsy (needle) or
 /// palpation (any other tool).
 ///
-/// A tool in the air that is outside the picture is what is wrong, whatever else is. A core without target begins the
-/// biopsy again. A length that is off is told with its direction in the patient: towards the head, feet, front, back, left
-/// or right.
+/// A tool in the air that is outside the picture is what is wrong, whatever else is. As long as no core has enough
+/// target the biopsy begins again. A length that is off is told with its direction in the patient: towards the head, feet,
+/// front, back, left or right.
 Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view);
 
 }  // namespace palpate::render

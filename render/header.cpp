@@ -1,6 +1,7 @@
 #include <render/header.h>
 
 #include <base/said.h>
+#include <base/told_losses.h>
 
 #include <fmt/format.h>
 
@@ -271,7 +272,7 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
         add(said(tr("{:.0f} of 100 points"), result.total), 1.8 * font, white, true);
         for (const std::string& part : result.parts)
             add(part, font, grey, false);
-        add(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.1 * font, amber, true);
+        add(base::headingOfLosses(result.total, result.losses.size()), 1.1 * font, amber, true);
         for (const std::string& loss : result.losses)
             add(loss, 1.05 * font, white, false);
         add(smaller, font, grey, false);

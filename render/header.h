@@ -15,7 +15,7 @@ namespace palpate::render {
 struct ResultCard {
     double total = 0;                 // points of 100
     std::vector<std::string> parts;   // "Core 38 of 50"
-    std::vector<std::string> losses;  // the largest first: "-12  The core missed the tumour by 14 mm, towards the feet"
+    std::vector<std::string> losses;  // the largest first: "-12   The core missed the tumour by 14 mm, towards the feet"
 };
 
 /// What stands above the body: title, time, caption with the bar of a record, step, what is wrong, warning. One below the

@@ -1,7 +1,7 @@
 #include <render/overlay.h>
 
 #include <base/said.h>
-
+#include <render/coach.h>
 #include <render/deformation.h>
 #include <render/tool_picture.h>
 #include <render/volume_picture.h>
@@ -164,7 +164,7 @@ void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::Stat
                  millimetresText(state.aheadTissueDistance), grey);
     if (state.cores > 0)
         pen.pair(said(tr("core {}: {:.0f} % target"), state.cores, 100 * state.coreTarget),
-                 said(tr("{:.1Lf} mm of it"), state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
+                 said(tr("{:.1Lf} mm of it"), state.coreLength * 1e3), isEnough(state.coreTarget) ? good : amber);
     else if (needle && scenery.task == channel::Task::biopsy)
         pen.pair(tr("no core taken yet"), "", grey);
 }
@@ -331,7 +331,10 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
         const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
         const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear ||
                              event->kind == EventKind::refused || event->kind == EventKind::stopped;
-        const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
+        const Colour colour = bad                                                          ? red
+                              : warning                                                    ? amber
+                              : event->kind == EventKind::fired && isEnough(event->target) ? good
+                                                                                           : white;
         pen.pair(words(*event, scenery), said("{:.1Lf} s", event->time), colour);
     }
 }

@@ -1,11 +1,12 @@
 #include <render/result_file.h>
 
 #include <base/said.h>
+#include <base/told_losses.h>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <fstream>
+#include <vector>
 
 namespace palpate::render {
 namespace {
@@ -31,7 +32,6 @@ std::optional<ResultCard> readResult(const std::filesystem::path& file)
         return std::nullopt;
     try {
         constexpr std::size_t most = 3;
-        constexpr double least = 0.5;  // as haptics::toldPoints: less would contradict a total without decimals
         const auto& score = figures.at("score");
         const std::string judged = score.value("judged", palpated(score) ? "marks" : "core");
         ResultCard card;
@@ -42,10 +42,13 @@ std::optional<ResultCard> readResult(const std::filesystem::path& file)
             card.parts.push_back(said(tr("{} {:.0f} of {}"), tr(name), score.at("points").at(key).get<double>(), points));
         if (figures.value("contacts", 1) == 0)
             card.losses.emplace_back(tr("The tool never touched the body: this session does not count."));
-        for (const auto& loss : score.value("losses", nlohmann::json::array()))
-            if (card.losses.size() < most && loss.at("points").get<double>() > least)
-                card.losses.push_back(
-                    fmt::format("-{:.0f}   {}", loss.at("points").get<double>(), loss.at("words").get<std::string>()));
+        const auto losses = score.value("losses", nlohmann::json::array());
+        std::vector<double> points;
+        for (const auto& loss : losses)
+            points.push_back(loss.at("points").get<double>());
+        for (const std::size_t i : base::toldLosses(points))
+            if (card.losses.size() < most)
+                card.losses.push_back(base::lossInWords(points[i]) + "   " + losses[i].at("words").get<std::string>());
         return card;
     } catch (const nlohmann::json::exception&) {
         return std::nullopt;

@@ -216,13 +216,15 @@ std::vector<Point2> stickOutline(Point2 from, Point2 to, double radius)
     return corners;
 }
 
-void SlicePicture::drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius) const
+void SlicePicture::drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius, bool away) const
 {
     const std::vector<Point2> corners = stickOutline(from, to, radius);
+    const double width = away ? 1.5 : 3;
+    const Colour& colour = away ? farTool : toolColour;
     for (const bool border : {true, false})
         for (std::size_t i = 0; i < corners.size(); ++i)
             if (const auto part = clipped(corners[i], corners[(i + 1) % corners.size()], area_))
-                canvas.line(part->first, part->second, border ? 5 : 3, border ? Colour{0, 0, 0} : toolColour);
+                canvas.line(part->first, part->second, width + (border ? 2 : 0), border ? Colour{0, 0, 0} : colour);
 }
 
 void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const
@@ -233,13 +235,13 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
     if (scenery.tool == channel::ToolKind::sphere) {
         if (area_.holds(pixel(tip))) {
             canvas.ring(pixel(tip), width / 2 + 1.5, 1.5, outline);
-            canvas.ring(pixel(tip), width / 2, 3, toolColour);
+            canvas.ring(pixel(tip), width / 2, isAway(tip) ? 1.5 : 3, isAway(tip) ? farTool : toolColour);
         }
         return;
     }
     const channel::NeedleShape shape = needleShape(scenery, state);
     if (scenery.tool == channel::ToolKind::capsule)
-        return drawFingertip(canvas, pixel(shape.front()), pixel(shape.back()), width / 2);
+        return drawFingertip(canvas, pixel(shape.front()), pixel(shape.back()), width / 2, isAway(tip));
     for (const bool border : {true, false})
         for (std::size_t i = 0; i + 1 < shape.size(); ++i) {
             const auto part = clipped(pixel(shape[i]), pixel(shape[i + 1]), area_);

@@ -52,7 +52,7 @@ private:
     /// Not in the plane, but before or behind it.
     bool isAway(glm::dvec3 p) const;
     void drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
-    void drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius) const;
+    void drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius, bool away) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;
     void drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const;
 

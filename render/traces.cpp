@@ -40,11 +40,49 @@ struct Diagram {
     double y(double value) const { return inner.y + inner.height * std::clamp(value / top, 0.0, 1.0); }
 };
 
+// Where the names of curves stand, from the left end and in rows from above. All have a place where there is room for
+// their rows; what has none is left out from the end.
+struct CurveNames {
+    struct Place {
+        double x;  // [pixels]
+        int row;
+    };
+    std::vector<Place> places;
+    int rows = 1;
+};
+
+constexpr double nameSize = 0.85, nameRow = 1.2, traceLeft = 3.2, traceBelow = 1.7, traceAbove = 3.2;  // in fonts
+
+CurveNames namesOf(const Canvas& canvas, const Area& area, double font, const std::vector<Curve>& curves)
+{
+    constexpr double least = 3;  // of the diagram, in fonts
+    const double size = nameSize * font, first = area.x + std::floor(traceLeft * font);
+    const double spare = area.height - (traceBelow + traceAbove + least) * font;
+    const int most = 1 + std::max(0, static_cast<int>(spare / (nameRow * font)));
+    CurveNames names;
+    double x = first;
+    for (const Curve& curve : curves) {
+        const double wide = canvas.widthOf(curve.name, size) + 2.4 * size;
+        if (x > first && x + wide - size > area.x + area.width) {
+            x = first;
+            ++names.rows;
+        }
+        if (names.rows > most || x + wide - size > area.x + area.width) {
+            names.rows = std::min(names.rows, most);
+            break;
+        }
+        names.places.push_back({x, names.rows - 1});
+        x += wide;
+    }
+    return names;
+}
+
 Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string& title, double now, double top,
-                const std::string& unit)
+                const std::string& unit, int rows)
 {
     canvas.rectangle(area, panelColour);
-    const int left = static_cast<int>(3.2 * font), low = static_cast<int>(1.7 * font), high = static_cast<int>(3.2 * font);
+    const int left = static_cast<int>(traceLeft * font), low = static_cast<int>(traceBelow * font),
+              high = static_cast<int>((traceAbove + (rows - 1) * nameRow) * font);
     const Diagram d{canvas,
                     {area.x + left, area.y + low, area.width - left - static_cast<int>(font), area.height - low - high},
                     font,
@@ -79,18 +117,16 @@ void draw(const Diagram& d, const History& history, const Curve& curve)
     }
 }
 
-void drawAll(const Diagram& d, const Area& area, const History& history, const std::vector<Curve>& curves)
+void drawAll(const Diagram& d, const Area& area, const History& history, const std::vector<Curve>& curves,
+             const CurveNames& names)
 {
-    double x = d.inner.x;
-    const double y = area.y + area.height - 2.8 * d.font, size = 0.85 * d.font;
-    for (const Curve& curve : curves) {
+    for (const Curve& curve : curves)
         draw(d, history, curve);
-        const double wide = d.canvas.widthOf(curve.name, size) + 2.4 * size;
-        if (x + wide - size > area.x + area.width)
-            continue;
-        d.canvas.rectangle({x, y + 0.3 * size}, {size, 0.4 * size}, curve.colour);
-        d.canvas.text({x + 1.3 * size, y}, curve.name, size, white);
-        x += wide;
+    const double size = nameSize * d.font;
+    for (std::size_t i = 0; i < names.places.size(); ++i) {
+        const double x = names.places[i].x, y = area.y + area.height - (2.8 + nameRow * names.places[i].row) * d.font;
+        d.canvas.rectangle({x, y + 0.3 * size}, {size, 0.4 * size}, curves[i].colour);
+        d.canvas.text({x + 1.3 * size, y}, curves[i].name, size, white);
     }
 }
 
@@ -109,13 +145,16 @@ void drawForceTraces(Canvas& canvas, const Area& area, double font, const channe
         most = std::max({most, moment.basic, moment.additional, moment.total});
     // Half the limit when that is enough: most procedures need less.
     const double top = most > 0.5 * cap ? 1.1 * cap : 0.55 * cap;
-    const Diagram d = frameOf(canvas, area, font, base::tr("FORCE ON THE HAND"), nowOf(history), std::ceil(top), "N");
+    const std::vector<Curve> curves{
+        {base::tr("basic"), basicColour, 1.5, [](const auto& m) { return m.basic; }},
+        {base::tr("additional"), additionalColour, 1.5, [](const auto& m) { return m.additional; }},
+        {base::tr("total"), good, 2.5, [](const auto& m) { return m.total; }}};
+    const CurveNames names = namesOf(canvas, area, font, curves);
+    const Diagram d =
+        frameOf(canvas, area, font, base::tr("FORCE ON THE HAND"), nowOf(history), std::ceil(top), "N", names.rows);
     if (cap < d.top)
         canvas.rectangle({static_cast<double>(d.inner.x), d.y(cap)}, {static_cast<double>(d.inner.width), 2}, red);
-    drawAll(d, area, history,
-            {{base::tr("basic"), basicColour, 1.5, [](const auto& m) { return m.basic; }},
-             {base::tr("additional"), additionalColour, 1.5, [](const auto& m) { return m.additional; }},
-             {base::tr("total"), good, 2.5, [](const auto& m) { return m.total; }}});
+    drawAll(d, area, history, curves, names);
 }
 
 void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,
@@ -133,13 +172,14 @@ void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const cha
         });
     order.resize(std::min(count, shown));  // the nearest first: a narrow legend has no room for the last
     constexpr double top = 40;             // [mm]
-    const Diagram d = frameOf(canvas, area, font, base::tr("DISTANCE FROM THE TIP"), nowOf(history), top, "mm");
     std::vector<Curve> curves;
     for (const std::size_t s : order)
         curves.push_back({base::spokenHere(text(scenery.structure[s])), s == 0 ? good : colours[s % colours.size()],
                           s == 0 ? 2.5 : 1.5,
                           [s](const History::Moment& m) { return 1e3 * static_cast<double>(m.distance[s]); }, true});
-    drawAll(d, area, history, curves);
+    const CurveNames names = namesOf(canvas, area, font, curves);
+    const Diagram d = frameOf(canvas, area, font, base::tr("DISTANCE FROM THE TIP"), nowOf(history), top, "mm", names.rows);
+    drawAll(d, area, history, curves, names);
 }
 
 }  // namespace palpate::render

@@ -1,6 +1,7 @@
 #include <session/session.h>
 
 #include <base/error.h>
+#include <base/words.h>
 
 #include <glm/geometric.hpp>
 
@@ -64,6 +65,8 @@ SessionFigures Session::figures() const
     SessionFigures figures = figures_;
     figures.score = watch_.score();
     figures.losses = watch_.losses(info_);
+    const base::English always;
+    figures.lossesInEnglish = watch_.losses(info_);
     figures.forceHash = hash_.value();
     figures.level = simulation_.level();
     return figures;

@@ -19,6 +19,7 @@ namespace palpate::session {
 struct SessionFigures {
     haptics::Score score;                                  // of all ticks so far
     std::vector<haptics::Loss> losses;                     // where its points went, the largest first
+    std::vector<haptics::Loss> lossesInEnglish;            // the same, whatever language the session's window has
     std::vector<haptics::CoreSample> cores;                // at most 64, in their order
     std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
     std::uint64_t contacts = 0;                            // events: the tool touched the body

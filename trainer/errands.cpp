@@ -294,6 +294,7 @@ struct Errands::Impl {
     {
         film.make(programs, state.files.record, titleOption(chosenCase(state).title), scratch / "film.log");
         state.filming = true;
+        state.leaving = false;  // there is more to lose now
     }
     void keepSettings(State& state)
     {
@@ -411,8 +412,9 @@ struct Errands::Impl {
             return ended;
         });
         if (film.ended()) {
+            state.leaving ? state.notice.clear() : void();  // it was said what would be lost
             film.take(state.told, state.notice);
-            state.filming = false;
+            state.filming = state.leaving = false;
             changed = true;
         }
         if (pages.ended()) {

@@ -118,6 +118,14 @@ void drawKeptList(State& state)
     }
 }
 
+// Esc leaves the field with what was typed: ImGui would put back the text that was there when it was entered.
+void drawNote(std::string& note)
+{
+    const std::string typed = note;
+    ImGui::InputTextMultiline("##note", &note, {ImGui::GetContentRegionAvail().x, 6 * ImGui::GetFontSize()});
+    note = ImGui::IsKeyPressed(ImGui::GetIO().KeyMap[ImGuiKey_Escape]) ? typed : note;
+}
+
 // The chosen session: what it came to, and the instructor's word on it.
 Errand drawKept(State& state)
 {
@@ -144,7 +152,7 @@ Errand drawKept(State& state)
     }
     ImGui::NewLine();
     words(tr("Note"));
-    ImGui::InputTextMultiline("##note", &i.note, {ImGui::GetContentRegionAvail().x, 6 * ImGui::GetFontSize()});
+    drawNote(i.note);
     noteTyped(state);
     const bool changed = hasDraft(i, s);
     ImGui::BeginDisabled(!changed);

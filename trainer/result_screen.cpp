@@ -1,6 +1,7 @@
 #include <trainer/widgets.h>
 
 #include <base/said.h>
+#include <base/told_losses.h>
 
 #include <algorithm>
 
@@ -45,13 +46,13 @@ void drawMeasures(const Result& result)
 Errand drawLosses(State& state)
 {
     const Result& result = state.result;
-    heading(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.15F);
+    heading(base::headingOfLosses(result.total, result.losses.size()), 1.15F);
     constexpr std::size_t most = 3;
     Errand errand = Errand::none;
     for (std::size_t i = 0; i < std::min(most, result.losses.size()); ++i) {
         const LossOfPoints& loss = result.losses[i];
         ImGui::PushID(static_cast<int>(i));
-        words(said("-{:.0f}   {}", loss.points, loss.words));
+        words(base::lossInWords(loss.points) + "   " + loss.words);
         if (loss.at) {
             ImGui::BeginDisabled(state.replaying);
             const bool clicked = ImGui::Button(fitted(said(tr("See it, at {:.1Lf} s ({})"), *loss.at, i + 1)).c_str());

@@ -1,8 +1,10 @@
 #include <trainer/results.h>
 
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/printable.h>
 #include <base/said.h>
+#include <base/told_losses.h>
 #include <base/user_files.h>
 #include <trainer/lists.h>
 
@@ -134,6 +136,16 @@ std::string whyNoScore(const fs::path& figures)
                 asTyped("palpate-view", {"--replay", record}), asTyped("palpate", {"score", record}));
 }
 
+std::vector<LossOfPoints> lossesIn(const nlohmann::json& score)
+{
+    const auto losses = score.value("losses", nlohmann::json::array());
+    const auto points =
+        base::mapped<double>(losses, [](const auto& loss) { return loss.at("points").template get<double>(); });
+    return base::mapped<LossOfPoints>(base::toldLosses(points), [&](std::size_t i) {
+        return LossOfPoints{points[i], losses[i].at("words").template get<std::string>(), numberAt(losses[i], "at_s")};
+    });
+}
+
 }  // namespace
 
 Result readResult(const fs::path& figures)
@@ -149,14 +161,7 @@ Result readResult(const fs::path& figures)
                                               {"technique", marked("Technique"), 25.0}}) {
             result.parts.push_back({tr(name), score.at("points").at(key).get<double>(), most});
         }
-        for (const auto& loss : score.value("losses", nlohmann::json::array())) {
-            // As haptics::toldPoints: less would contradict a total without decimals.
-            if (loss.at("points").get<double>() <= 0.5) {
-                continue;
-            }
-            result.losses.push_back(
-                {loss.at("points").get<double>(), loss.at("words").get<std::string>(), numberAt(loss, "at_s")});
-        }
+        result.losses = lossesIn(score);
         addMeasures(json.value("asked", nlohmann::json::array()), score, judged, result);
         result.fault = json.value("problem", "");
         result.notKept = !json.value("kept", true);

@@ -75,6 +75,9 @@ bool Running::failed() const noexcept
 
 std::string Running::message() const
 {
+    if (pid_ < 0 && WIFSIGNALED(status_)) {
+        return "";
+    }
     std::ifstream in(log_);
     std::string last;
     for (std::string line; std::getline(in, line);) {

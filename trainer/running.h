@@ -26,7 +26,8 @@ public:
     bool ended() noexcept;
     /// @pre  it has ended
     bool failed() const noexcept;
-    /// The last line that the command printed as its own message.
+    /// The last line that the command printed as its own message; nothing of a command that was killed, which had no time
+    /// to say why.
     std::string message() const;
 
 private:

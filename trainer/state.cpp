@@ -157,14 +157,19 @@ Errand goBack(State& state)
 
 Errand leave(State& state)
 {
-    const bool notes = !state.instructor.drafts.empty();
-    if (state.leaving || (!notes && !state.running)) {
+    std::string lost;
+    const auto add = [&lost](bool now, const char* what) {
+        lost += now ? (lost.empty() ? "" : "\n") + std::string(what) : "";
+    };
+    add(state.running, tr("A session still runs: end it first, or close again to break it off."));
+    add(state.filming, tr("A film is still being made: wait for it, or close again to lose it."));
+    add(!state.instructor.drafts.empty(), tr("There are notes that are not kept yet (Instructor, Sessions that were kept). "
+                                             "Close again to lose them."));
+    if (state.leaving || lost.empty()) {
         return Errand::quit;
     }
     state.leaving = true;
-    state.notice = state.running ? tr("A session still runs: end it first, or close again to break it off.")
-                                 : tr("There are notes that are not kept yet (Instructor, Sessions that were kept). Close "
-                                      "again to lose them.");
+    state.notice = lost;
     return Errand::none;
 }
 

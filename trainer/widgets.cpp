@@ -219,6 +219,7 @@ Errand drawSettings(State& state)
         beside("200 %");
     }
     ImGui::NewLine();
+    words(tr("In a session they grow with its window."), quiet);
     if (ImGui::Button(tr("Close")) || ImGui::IsKeyPressed(ImGui::GetIO().KeyMap[ImGuiKey_Escape], false)) {
         ImGui::CloseCurrentPopup();
     }

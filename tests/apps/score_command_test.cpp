@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <cstdlib>
 #include <fstream>
 
 namespace palpate::apps {
@@ -71,6 +72,24 @@ TEST(ScoreCommand, PrintsAlsoWhereItsFileCannotBeWritten)
     const std::string error = tests::errorOf([&] { score({a, "--json", "/dev/full"}, printed); });
     EXPECT_EQ(printed, score({a}));
     EXPECT_NE(error.find("/dev/full: "), std::string::npos) << error;
+}
+
+// On a German desktop only windows speak German: a command had English words and German decimals.
+TEST(ScoreCommand, IsEnglishWhateverTheDesktopSpeaks)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(2000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        ticks[n].phase = haptics::Phase::inserted;
+        ticks[n].distance = {1, -1e-3, 1};  // in a vital structure
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    const std::string a = folder / "a", english = score({a});
+    EXPECT_NE(english.find("in a vital structure for 2.0 s"), std::string::npos) << english;
+    ::setenv("LANGUAGE", "de", 1);
+    EXPECT_EQ(score({a}), english);
+    ::unsetenv("LANGUAGE");
 }
 
 // A folder of pictures that is not there, before the score: nothing is written by halves.

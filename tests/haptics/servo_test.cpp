@@ -372,12 +372,14 @@ TEST(Broadcast, MissedTicksAreCountedAgainstTheClockOnly)
 }
 
 // 31 bytes are there for it; a letter of two bytes is there whole or not at all.
+// 31 bytes are there for it; what is cut off is marked, and a letter of two bytes is there whole or not at all.
 TEST(Broadcast, SaysWhoTrains)
 {
-    const std::string session = "test-who-" + std::to_string(getpid()), start(29, 'a');
+    const std::string session = "test-who-" + std::to_string(getpid()), start(27, 'a');
     for (const auto& [who, seen] : {std::pair{std::string("Ada"), std::string("Ada")},
-                                    {start + "a\u00fc", start + "a"},
-                                    {start + "\u00fca", start + "\u00fc"}}) {
+                                    {start + "aaaa", start + "aaaa"},
+                                    {start + "aaaaa", start + "a\u2026"},
+                                    {start + "\u00fcaaa", start + "\u2026"}}) {
         const Broadcast broadcast(session, tests::blockSphere(), channel::handElsewhere, who);
         const auto viewer = channel::Subscriber::attach(session);
         ASSERT_TRUE(viewer);

@@ -2,6 +2,7 @@
 #include <render/display.h>
 #include <render/history.h>
 #include <render/traces.h>
+#include <tests/render/body.h>
 
 #include <gtest/gtest.h>
 
@@ -10,9 +11,11 @@
 #include <vtkRenderWindow.h>
 #include <vtkWindowToImageFilter.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace palpate::render {
 namespace {
@@ -101,6 +104,27 @@ TEST_F(CanvasTest, ATraceHasGapsAboveItsUpperEdge)
     EXPECT_GT(lightAt(20e-3F, 20e-3F), none);
     EXPECT_GT(lightAt(60e-3F, 20e-3F), none);
     EXPECT_LT(lightAt(60e-3F, 20e-3F), lightAt(20e-3F, 20e-3F));
+}
+
+// As wide as in the instructor's layout at 1024 x 768.
+TEST_F(CanvasTest, EveryTraceHasItsName)
+{
+    window_->SetSize(400, 240);
+    Canvas canvas(*renderer_);
+    channel::Scenery scenery;
+    scenery.structures = 4;
+    const std::vector<std::string> names{"lesion", "portal and splenic vein", "inferior vena cava", "gallbladder"};
+    for (std::size_t s = 0; s < names.size(); ++s)
+        scenery.structure[s] = named(names[s]);
+    canvas.begin();
+    drawDistanceTraces(canvas, {0, 0, 347, 230}, 17, scenery, {});
+    canvas.end();
+    for (const std::string& name : names) {
+        const auto all = canvas.written();
+        const auto at = std::ranges::find(all, name, &Written::words);
+        ASSERT_NE(at, all.end()) << name;
+        EXPECT_LE(at->high[0], 347) << name;
+    }
 }
 
 }  // namespace

@@ -143,6 +143,24 @@ TEST(Coach, AMissBeginsAnew)
     EXPECT_EQ(c.wrong, "Core 1 holds 0 % tumour: take another");
 }
 
+// Briefings ask for half, and the score has all points for it: what is shown as less is not enough.
+TEST(Coach, OneCoreWithHalfOfItTargetEndsABiopsy)
+{
+    channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
+    s.distance[0] = s.ahead[0] = 1e-3;
+    s.cores = s.bestCore = 1;
+    for (const auto& [target, told] : {std::pair{0.1, "10"}, {0.33, "33"}, {0.494, "49"}}) {
+        s.coreTarget = s.bestTarget = target;
+        const Coaching c = coach(needleScenery(), s, view);
+        EXPECT_EQ(c.step, 4);
+        EXPECT_EQ(c.wrong, std::string("Core 1 holds ") + told + " % tumour: take another");
+    }
+    for (const double target : {0.496, 0.5, 1.0}) {
+        s.coreTarget = s.bestTarget = target;
+        EXPECT_EQ(coach(needleScenery(), s, view).step, 5) << target;
+    }
+}
+
 // The score takes the best core: a later shot beside it, or into the hole of the first, sends nobody back.
 TEST(Coach, ALaterMissTakesNoStepBack)
 {

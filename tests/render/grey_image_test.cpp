@@ -1,17 +1,22 @@
 #include <render/grey_image.h>
 
 #include <render/slice_picture.h>
+#include <render/tool_picture.h>
 #include <render/volume_picture.h>
 #include <tests/render/body.h>
+#include <tests/render/studio.h>
 
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <vtkActor2D.h>
+#include <vtkCellData.h>
 #include <vtkImageData.h>
 #include <vtkImageMapper.h>
 #include <vtkNew.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper2D.h>
 #include <vtkPropCollection.h>
 #include <vtkRenderer.h>
 
@@ -242,6 +247,43 @@ TEST(SliceOfAnImage, WithoutOneIsTheTissuesColours)
     const Slice::Pixel fat = with.pixelAt(60, 100), artery = with.pixelAt(60, 20);
     EXPECT_EQ(fat, (Slice::Pixel{242, 217, 128}));
     EXPECT_EQ(artery, (Slice::Pixel{217, 26, 26}));
+}
+
+// Whether a shape of a canvas has this colour.
+bool shows(vtkRenderer& renderer, const Colour& colour)
+{
+    auto* actor = vtkActor2D::SafeDownCast(renderer.GetViewProps()->GetItemAsObject(0));
+    vtkPolyData& shapes = *static_cast<vtkPolyDataMapper2D*>(actor->GetMapper())->GetInput();
+    const Pixel wanted = pixelOf(colour);
+    for (vtkIdType i = 0; i < shapes.GetNumberOfCells(); ++i) {
+        const double* const own = shapes.GetCellData()->GetScalars()->GetTuple(i);
+        if (near({static_cast<int>(own[0]), static_cast<int>(own[1]), static_cast<int>(own[2])}, wanted, 1))
+            return true;
+    }
+    return false;
+}
+
+// As parts of a needle are: a fingertip over 2 mm off the plane is no hole in what the slice shows.
+TEST(SliceOfAnImage, AFingertipOffItsPlaneIsThinnerAndDarker)
+{
+    Block block;
+    Slice slice(block);
+    slice.draw(SliceLook::tissue);
+    vtkNew<vtkRenderer> renderer;
+    Canvas canvas(*renderer);
+    channel::Scenery scenery = block.scenery;
+    scenery.toolRadius = 4e-3;
+    for (const channel::ToolKind tool : {channel::ToolKind::sphere, channel::ToolKind::capsule})
+        for (const double off : {1.5e-3, 2.5e-3}) {
+            scenery.tool = tool;
+            channel::State state;
+            state.tip = {Slice::centre, Slice::centre, 20e-3 + off};
+            state.axis = {0, 1, 0};
+            canvas.begin();
+            slice.picture.annotate(canvas, {scenery, slice.deformation, slice.grey, SliceLook::tissue}, state, {}, 10);
+            canvas.end();
+            EXPECT_EQ(shows(*renderer, toolColour), off < 2e-3) << static_cast<int>(tool);
+        }
 }
 
 }  // namespace

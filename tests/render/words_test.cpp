@@ -337,6 +337,17 @@ TEST_F(WordsTest, ABodyThatIsGuidedByCtHasNoUltrasoundPicture)
     picture.showUltrasound(false);
 }
 
+// Half a point less than 100, which is shown as 100: the loss has its name.
+TEST(ResultFile, NamesTheOnlyLossHoweverSmall)
+{
+    const tests::Folder folder;
+    std::ofstream(folder / "r.json") << R"({"score": {"total": 99.62, "points": {"core": 50, "vital": 25,
+        "technique": 24.62}, "losses": [{"points": 0.38, "words": "The tip went 166 mm inside the body"}]}})";
+    const auto card = readResult(folder / "r.json");
+    ASSERT_TRUE(card);
+    EXPECT_EQ(card->losses, std::vector<std::string>{"-0.4   The tip went 166 mm inside the body"});
+}
+
 // What was asked for is named, and not always a core.
 TEST(ResultFile, NamesWhatWasJudged)
 {

@@ -362,6 +362,26 @@ echo '{"score": {"total": 71, "points": {"core": 50, "vital": 21, "technique": 0
     EXPECT_EQ(state.notice, "") << "it is said once";
 }
 
+// What a session that was killed had printed before is not why it ended: its record is what is told.
+TEST(Errands, ASessionThatWasKilledSaysWhereItsRecordIs)
+{
+    const Folder folder;
+    makeScript(folder / "palpate", R"(for last; do
+  if [ "$before" = --record ]; then echo > "$last"; fi
+  before="$last"
+done
+echo 'palpate: the session starts again' >&2
+kill -9 $$)");
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.cases = {caseCalled("a")};
+    errands.run(Errand::startSession, state);
+    ASSERT_TRUE(state.running) << state.notice;
+    lookUntil(errands, state, [&] { return !state.running; });
+    EXPECT_NE(state.result.problem.find("The session was cut off"), std::string::npos) << state.result.problem;
+}
+
 // The profile is erased in a terminal while its session runs: figures that are written afterwards are not left, nothing can
 // be watched, and the case has no points from it. With the record there, or of nobody, the session is as any other.
 TEST(Errands, ASessionWhoseProfileWasErasedLeavesNothing)

@@ -91,13 +91,16 @@ TEST(Results, ASessionThatWasNotKeptSaysWhy)
     EXPECT_FALSE(state.cases[0].best);
 }
 
-// "100 of 100 points" and a loss of one contradict each other.
-TEST(Results, ALossThatTheTotalDoesNotShowIsNotTold)
+// "100 of 100 points" and a loss of one contradict each other; so do no loss and a bar that is not full.
+TEST(Results, ALossThatTheTotalDoesNotShowIsToldWhereItIsTheOnlyOne)
 {
     const Folder folder;
-    std::string text = figures;
-    write(folder / "a.json", text.replace(text.find("\"points\": 12"), 12, "\"points\": 0.4"));
-    EXPECT_TRUE(readResult(folder / "a.json").losses.empty());
+    for (const auto& [losses, told] :
+         {std::pair{"12, \"words\": \"large\"}, {\"points\": 0.4", 1U}, {"0.4", 1U}, {"0.04", 0U}}) {
+        std::string text = figures;
+        write(folder / "a.json", text.replace(text.find("12, \"words"), 2, losses));
+        EXPECT_EQ(readResult(folder / "a.json").losses.size(), told) << losses;
+    }
 }
 
 TEST(Results, ABrokenFileIsAProblemAndNoCrash)

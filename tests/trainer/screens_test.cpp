@@ -195,6 +195,41 @@ TEST_P(Screens, TheHintOfANameIsWhole)
     EXPECT_EQ(g.InputTextState.ScrollX, 0);
 }
 
+// A note that was not kept yet stays: Esc leaves its field, and takes nothing back.
+TEST_P(Screens, EscInANoteKeepsWhatWasTyped)
+{
+    auto all = exampleScreens(listed());
+    const auto kept = std::ranges::find(all, "instructor, kept", [](const auto& one) { return one.first; });
+    ASSERT_NE(kept, all.end());
+    State& state = kept->second;
+    draw(state);
+    ImGuiContext& g = *ImGui::GetCurrentContext();
+    ImGuiIO& io = ImGui::GetIO();
+    io.KeyMap[ImGuiKey_Escape] = 0;
+    ImGuiID field = 0;
+    for (const ImGuiWindow* w : windows()) {
+        const ImGuiID here = ImHashStr("##note", 0, w->ID);
+        g.NavNextActivateId = here;
+        g.NavNextActivateFlags = ImGuiActivateFlags_PreferInput;
+        draw(state, false);
+        field = g.ActiveId == here ? here : field;
+    }
+    if (field == 0) {
+        EXPECT_FALSE(roomForTwo()) << "where it is rolled out of sight";
+        return;
+    }
+    const std::string before = state.instructor.note;
+    io.AddInputCharactersUTF8("Good.");
+    draw(state, false);
+    ASSERT_EQ(state.instructor.note, before + "Good.");
+    for (const bool down : {true, false}) {
+        io.KeysDown[0] = down;
+        draw(state, false);
+    }
+    EXPECT_EQ(state.instructor.note, before + "Good.");
+    EXPECT_NE(g.ActiveId, field) << "Esc leaves the field";
+}
+
 // A part that rolls shows enough of itself to be read: a heading and four lines.
 TEST_P(Screens, WhatRollsIsNoSlit)
 {

@@ -151,6 +151,14 @@ TEST(State, WhatWouldBeLostIsSaidBeforeTheWindowCloses)
     EXPECT_EQ(leave(state), Errand::quit);
     sessionEnded(state, scored(50));
     EXPECT_EQ(state.notice, "");
+    state.filming = true;
+    state.instructor.drafts[{"Ada", 3}] = {"calm hands", 4};
+    EXPECT_EQ(leave(state), Errand::none);
+    EXPECT_NE(state.notice.find("film"), std::string::npos);
+    EXPECT_NE(state.notice.find("notes"), std::string::npos) << "all that is lost";
+    EXPECT_EQ(leave(state), Errand::quit);
+    state.filming = state.leaving = false;
+    state.instructor.drafts.clear();
     EXPECT_EQ(leave(state), Errand::quit);
 }
 
