@@ -70,7 +70,7 @@ struct ElasticLoad {
 /// slips by mu p h / 2 E until it slides, 0.1 mm and less. As stiff as the push it would slide and stick from one call to
 /// the next, since a tool goes further in a millisecond.
 ///
-/// A call goes over all sites some ten times: what is asked for together lies in one cache line.
+/// A call goes over all sites some fourteen times: what is asked for together lies in one cache line.
 struct alignas(64) ContactSite {
     static constexpr double gripOfPush = 0.1;  // stiffness of friction, of the push's
 

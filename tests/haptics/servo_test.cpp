@@ -371,7 +371,6 @@ TEST(Broadcast, MissedTicksAreCountedAgainstTheClockOnly)
     }
 }
 
-// 31 bytes are there for it; a letter of two bytes is there whole or not at all.
 // 31 bytes are there for it; what is cut off is marked, and a letter of two bytes is there whole or not at all.
 TEST(Broadcast, SaysWhoTrains)
 {
