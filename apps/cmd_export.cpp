@@ -255,11 +255,14 @@ void runExport(const CLI::App& app, ExportArguments o)
 {
     const bool usual = o.what.empty();
     checkOptions(o);
-    auto record = o.record.empty() ? std::nullopt : std::optional<haptics::Record>(std::in_place, o.record);
-    if (usual && o.what == "ultrasound" && o.like.empty() && isCtRecord(*record)) {
-        o.what = "ct";
+    std::optional<haptics::Record> record;
+    if (usual && o.what == "ultrasound" && o.like.empty()) {
+        o.what = isCtRecord(record.emplace(o.record)) ? "ct" : o.what;
     }
     checkUse(app, o);
+    if (!o.record.empty() && !record) {
+        record.emplace(o.record);
+    }
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("reading");
     volume::ExportOptions how;

@@ -37,11 +37,12 @@ ShownState shownState(const haptics::Record& record, double at, std::optional<st
 /// The body of a recorded session at one moment, computed again from the record's poses.
 class DeformedState {
 public:
-    /// @param record    or its file
+    /// @param record    stays open for as long as this
     /// @param at        session time [s]; the last tick that is not later
     /// @param progress  is called with the share that is done; may be empty
     /// Throws std::runtime_error for a time that the record does not have and for forces that are not the record's.
     DeformedState(haptics::Record record, double at, const std::function<void(double)>& progress);
+    /// The same of the record in a file.
     DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
         : DeformedState(haptics::Record(file), at, progress)
     {
