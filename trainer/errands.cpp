@@ -334,8 +334,7 @@ struct Errands::Impl {
         Result result = readResult(state.files.figures);
         const bool scored = result.problem.empty();
         if (!scored) {
-            const std::string said = session->message();
-            result.problem = said.empty() || result.untouched ? result.problem : said;
+            result.problem = session->message().empty() || result.untouched ? result.problem : session->message();
         } else {
             result.fault = result.fault.empty() && session->failed() ? session->message() : result.fault;
         }
