@@ -223,6 +223,7 @@ std::uint64_t runPaced(session::Session& session, double seconds, const TickSink
 
 Transfer measureTransfer(const SessionModel& model, const TransferOptions& options)
 {
+    const RealTimeClaim claim;  // to lock memory takes time, in which a viewer would not be late
     const std::string name = "bench-ipc-" + std::to_string(::getpid());
     session::Session session(model, infoOf(model));
     Pipe pipe;
