@@ -1,8 +1,9 @@
+#include <apps/no_thread.h>
+
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <system_error>
 
@@ -18,9 +19,8 @@ void endWithoutThread()
             std::rethrow_exception(what);
         }
     } catch (const std::system_error& e) {
-        if (e.code() == std::errc::resource_unavailable_try_again) {
-            std::fprintf(stderr, "%s: no thread can be started (%s): end other programs, or allow more (ulimit -u)\n",
-                         program_invocation_short_name, std::strerror(EAGAIN));
+        if (const char* const what = palpate::apps::noThread(e)) {
+            std::fprintf(stderr, "%s: %s\n", program_invocation_short_name, what);
             ::_exit(1);
         }
     } catch (...) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <apps/no_thread.h>
 #include <base/build.h>
 #include <base/inputs.h>
 #include <base/one_line.h>
@@ -35,10 +36,8 @@ int exitStatus(const CLI::App& app, const Work& work)
     } catch (const std::filesystem::filesystem_error& e) {
         say(base::inWords(e));
     } catch (const std::system_error& e) {
-        const bool noThread = e.code() == std::errc::resource_unavailable_try_again;
-        say(noThread
-                ? std::string("no thread can be started (") + e.what() + "): end other programs, or allow more (ulimit -u)"
-                : e.what());
+        const char* const what = noThread(e);
+        say(what != nullptr ? what : e.what());
     } catch (const std::exception& e) {
         say(e.what());
     }

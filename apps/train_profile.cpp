@@ -3,6 +3,7 @@
 #include <base/counted.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/told_losses.h>
 #include <base/user_files.h>
 #include <base/utc.h>
 #include <base/words.h>
@@ -144,7 +145,7 @@ Conclusion Training::keep(const haptics::SessionInfo& info, const session::Sessi
     std::vector<std::string> lines;
     const std::vector<haptics::Loss>& losses = figures.lossesInEnglish;
     for (std::size_t i = 0; i < std::min(shown, losses.size()); ++i) {
-        if (losses[i].points > haptics::toldPoints) {
+        if (losses[i].points > base::toldPoints) {
             lines.push_back(haptics::inWords(losses[i]));
         }
     }

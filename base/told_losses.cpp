@@ -6,14 +6,13 @@ namespace palpate::base {
 
 namespace {
 
-constexpr double halfPoint = 0.5;  // as haptics::toldPoints
-constexpr double shown = 0.05;     // by a decimal
+constexpr double shown = 0.05;  // by a decimal
 
 }  // namespace
 
 std::vector<std::size_t> toldLosses(std::span<const double> points)
 {
-    const double least = !points.empty() && points.front() > halfPoint ? halfPoint : shown;
+    const double least = !points.empty() && points.front() > toldPoints ? toldPoints : shown;
     std::vector<std::size_t> told;
     for (std::size_t i = 0; i < points.size(); ++i) {
         if (points[i] > least) {
@@ -25,7 +24,7 @@ std::vector<std::size_t> toldLosses(std::span<const double> points)
 
 std::string lossInWords(double points)
 {
-    return points > halfPoint ? said("-{:.0f}", points) : said("-{:.1Lf}", points);
+    return points > toldPoints ? said("-{:.0f}", points) : said("-{:.1Lf}", points);
 }
 
 const char* headingOfLosses(double total, std::size_t told) noexcept

@@ -7,6 +7,10 @@
 
 namespace palpate::base {
 
+/// Losses of no more are not told to people, but for toldLosses(): beside a total without decimals they would contradict
+/// it.
+inline constexpr double toldPoints = 0.5;
+
 /// Of losses, those that people are told beside a total without decimals: over half a point, as less would contradict it;
 /// where none is, those that a decimal shows, so that nobody reads of no loss beside a bar that is not full.
 /// @param points   the largest first

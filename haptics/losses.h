@@ -17,9 +17,6 @@ struct Loss {
     std::optional<double> at;  // when it happened, of the session [s]; nothing: at no one moment
 };
 
-/// Losses of no more are not told to people: beside a total without decimals they would contradict it.
-inline constexpr double toldPoints = 0.5;
-
 /// Scores a session tick by tick, as Scorer does, and remembers when points were lost and where the best core lay. For a
 /// live session and a record alike. add() allocates nothing.
 class LossWatch {

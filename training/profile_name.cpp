@@ -4,6 +4,9 @@
 #include <base/mapped.h>
 #include <base/utf8.h>
 
+#include <locale.h>
+#include <wctype.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -42,33 +45,12 @@ bool isIn(std::span<const Range> ranges, char32_t c)
     return std::ranges::any_of(ranges, [c](const Range& r) { return c >= r.first && c <= r.last; });
 }
 
-// Capital letters that are this far before their small ones. Source: CaseFolding.txt of Unicode 15, status C.
-struct Capitals {
-    Range range;
-    char32_t step = 0;
-};
-constexpr std::array capitals{
-    Capitals{{0x0041, 0x005A}, 32}, Capitals{{0x00C0, 0x00D6}, 32}, Capitals{{0x00D8, 0x00DE}, 32},
-    Capitals{{0x0386, 0x0386}, 38}, Capitals{{0x0388, 0x038A}, 37}, Capitals{{0x038C, 0x038C}, 64},
-    Capitals{{0x038E, 0x038F}, 63}, Capitals{{0x0391, 0x03A1}, 32}, Capitals{{0x03A3, 0x03AB}, 32},
-    Capitals{{0x0400, 0x040F}, 80}, Capitals{{0x0410, 0x042F}, 32}};
-// Pairs, the capital letter first: at even numbers, and at odd ones.
-constexpr std::array evenPairs{Range{0x0100, 0x012F}, Range{0x0132, 0x0137}, Range{0x014A, 0x0177},
-                               Range{0x0218, 0x021F}, Range{0x0460, 0x0481}, Range{0x048A, 0x04BF},
-                               Range{0x04D0, 0x052F}, Range{0x1E00, 0x1E95}, Range{0x1EA0, 0x1EFF}};
-constexpr std::array oddPairs{Range{0x0139, 0x0148}, Range{0x0179, 0x017E}, Range{0x01CD, 0x01DC}};
-
+// The small letter in any script; what C.UTF-8 calls so does not depend on the user's locale.
 char32_t small(char32_t c)
 {
-    const auto* const far =
-        std::ranges::find_if(capitals, [c](const Capitals& one) { return c >= one.range.first && c <= one.range.last; });
-    const bool pairs = (c % 2 == 0 && isIn(evenPairs, c)) || (c % 2 != 0 && isIn(oddPairs, c));
-    return far != capitals.end() ? c + far->step
-           : pairs               ? c + 1
-           : c == 0x0178         ? 0x00FF  // y with two dots
-           : c == 0x1E9E         ? 0x00DF  // sharp s
-           : c == 0x03C2         ? 0x03C3  // sigma at an end
-                                 : c;
+    static const locale_t unicode = ::newlocale(LC_CTYPE_MASK, "C.UTF-8", nullptr);
+    constexpr char32_t sigmaAtEnd = 0x03C2, sigma = 0x03C3;
+    return c == sigmaAtEnd ? sigma : unicode != nullptr ? ::towlower_l(static_cast<wint_t>(c), unicode) : c;
 }
 
 }  // namespace

@@ -9,8 +9,7 @@ namespace palpate::training {
 /// from their letter. Throws std::runtime_error.
 void checkProfileName(const std::string& name);
 
-/// Whether two names differ at most in capital and small letters: Latin, Greek and Cyrillic, of which names that somebody
-/// types twice are made.
+/// Whether two names differ at most in capital and small letters, in any script.
 bool isSameButForCase(const std::string& a, const std::string& b);
 
 }  // namespace palpate::training

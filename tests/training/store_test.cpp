@@ -94,7 +94,8 @@ TEST(ProfileStore, RefusesNamesThatAreNone)
     EXPECT_NE(errorOf([&] { store.add("anna", Hand::right); }).find("already"), std::string::npos);
     store.add("Jörg Ünal", Hand::right);
     store.add("Ελένη Жук", Hand::right);
-    for (const char* name : {"Anna", "ANNA", "jörg Ünal", "JÖRG ÜNAL", "ΕΛΈΝΗ ЖУК"}) {
+    store.add("Արամ", Hand::right);
+    for (const char* name : {"Anna", "ANNA", "jörg Ünal", "JÖRG ÜNAL", "ΕΛΈΝΗ ЖУК", "ԱՐԱՄ"}) {
         EXPECT_NE(errorOf([&] { store.add(name, Hand::right); }).find("differs only in capital letters"), std::string::npos)
             << name;
     }
