@@ -22,6 +22,8 @@ constexpr double maxBalance = 1.5;  // of forces that are far from balanced: the
 // Way along the surface from which a ball slips as a whole, in friction times depth: (2 - nu) / (2 - 2 nu), at nu = 0.5.
 // Source: R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949.
 constexpr double slipsWhole = 1.5;
+constexpr double relievedFrom = 2.5, relievedAll = 3.0;  // of a tool's radius, in cells: see Elastic::relieve()
+constexpr double notRelieved = 0.3;                      // friction from which cells are sheared so far that some snap [-]
 
 // By how much a site's force falls with each component of its way [N/m].
 glm::dmat3 tangentOf(const ContactSite& s) noexcept
@@ -264,6 +266,24 @@ bool Elastic::follow(const ElasticLoad& load) noexcept
 {
     multigrid_.clearContacts();
     return stack_.follow(whereItSticks(load), !atRest_);
+}
+
+// Bending modes are relieved where cells are narrow beside every tool, and none shears them by friction. It stays as it is
+// while the tissue is deformed, since a change would be felt.
+void Elastic::relieve(std::span<const ElasticTool> tools) noexcept
+{
+    double radius = tools.empty() ? 0.0 : std::numeric_limits<double>::infinity();
+    double friction = 0.0;
+    for (const ElasticTool& tool : tools) {
+        radius = std::min({radius, tool.shape.radiusA, tool.shape.radiusB});
+        friction = std::max(friction, tool.friction);
+    }
+    const double slips = std::clamp(1.0 - friction / notRelieved, 0.0, 1.0);
+    for (std::size_t l = 0; l < stack_.windows().size(); ++l) {
+        const double cells = radius / stack_.body().levels[l].nodes.spacing;
+        const double isWide = std::clamp((cells - relievedFrom) / (relievedAll - relievedFrom), 0.0, 1.0);
+        stack_[l].relief = static_cast<float>(slips * isWide);
+    }
 }
 
 // The tissue that sticks to a tool stays behind the tool's place over the surface at rest, and windows belong around the

@@ -187,6 +187,7 @@ private:
         bool isHalf = false;   // z is its correction, and the step along it is left
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
+    void relieve(std::span<const ElasticTool> tools) noexcept;
     bool follow(const ElasticLoad& load) noexcept;
     Focus whereItSticks(const ElasticLoad& load) noexcept;
     void solve(int most, ElasticResult& result) noexcept;

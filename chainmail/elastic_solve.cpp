@@ -42,6 +42,9 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
         refreshForces();  // the last load was only met
     }
     load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
+    if (atRest_) {
+        relieve(load.tools);
+    }
     const bool moves = follow(load);
     result.moved = moves || hasMoved;
     meet(load, result.moved);

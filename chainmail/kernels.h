@@ -62,7 +62,9 @@ struct CellStiffness {
     const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
     CellLayers layers{};                // without mu: no cell has one
     CutCells cuts{};
-    const Filling* filling = nullptr;                        // (count / lanes x 1); none: whole cells
+    const Filling* filling = nullptr;  // (count / lanes x 1); none: whole cells
+    /// How much less bending modes count in cells that are stretched, 0 to 1, by up to a third; see Kernels::applyFinite().
+    float relief = 0;
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
 
@@ -138,8 +140,9 @@ struct Kernels {
     /// neo-Hookean energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim,
     /// "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite
     /// when a cell inverts, and what the law adds to it (volume/law.h). The other modes have the energy above
-    /// in axes that turn and stretch with the cell, F^T m for a mode m, so that a turn costs nothing. `inverse` is
-    /// 1 / spacing [1/m].
+    /// in axes that turn and stretch with the cell, F^T m for a mode m, so that a turn costs nothing; with relief r its
+    /// component j is multiplied by 1 - 4/3 r (q y / (q^2 + y^2))^2, y = max(|F_j|^2 - 1, 0) for column j of F, q = 1.7.
+    /// `inverse` is 1 / spacing [1/m].
     /// @returns  the energy [J]
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                           float* scratch) noexcept;

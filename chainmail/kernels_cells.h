@@ -33,12 +33,13 @@ struct Linear {
 // Finite strain: stable neo-Hookean and what the law has beyond it, on the mean deformation gradient. With modes eight
 // times their size F = I + m / (4 h), and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h
 // times the scaled stiffness.
-template <typename Law, typename Layer>
+template <typename Law, typename Layer, typename Bending>
 struct Finite {
     float inverse;            // 1 / h
     const float* stiffening;  // of each cell, or none
     Layer layers;
     Cuts cuts;
+    Bending bending;
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
     std::size_t turn = 0;
 
@@ -95,7 +96,7 @@ struct Finite {
         g[2].x = p[2][0];
         g[2].y = p[2][1];
         g[2].z = p[2][2];
-        const Lanes bend = hourglassTurned(filled, mu, lambda, q, f, m, g);
+        const Lanes bend = hourglassTurned(filled, mu, lambda, q, bending, f, m, g);
         const Lanes layer = layers.finite(cell, lambda / (lambda + 2.0F * mu + tiny), q, h8, m, g);
         // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
@@ -345,11 +346,11 @@ void smoothOf(const Layout& layout, CellStiffness stiffness, const Smoother& by,
     sweepLinear(layout, stiffness, u, KeepSmooth{by.weight, by.diagonal, by.r, u, out, layout.count}, scratch);
 }
 
-template <typename Law, typename Layer>
-double sweepFinite(const Layout& layout, const CellStiffness& stiffness, float inverse, const float* u, float* out,
-                   float* scratch) noexcept
+template <typename Law, typename Layer, typename Bending>
+double sweepFinite(const Layout& layout, const CellStiffness& stiffness, Bending bending, float inverse, const float* u,
+                   float* out, float* scratch) noexcept
 {
-    Finite<Law, Layer> law{inverse, stiffness.stiffening, Layer(stiffness.layers), Cuts(stiffness.cuts)};
+    Finite<Law, Layer, Bending> law{inverse, stiffness.stiffening, Layer(stiffness.layers), Cuts(stiffness.cuts), bending};
     sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {
@@ -362,8 +363,12 @@ template <typename Law>
 double applyLaw(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                 float* scratch) noexcept
 {
-    return stiffness.layers.mu != nullptr ? sweepFinite<Law, Layers>(layout, stiffness, inverse, u, out, scratch)
-                                          : sweepFinite<Law, NoLayers>(layout, stiffness, inverse, u, out, scratch);
+    const auto sweep = [&](auto bending) {
+        return stiffness.layers.mu != nullptr
+                   ? sweepFinite<Law, Layers>(layout, stiffness, bending, inverse, u, out, scratch)
+                   : sweepFinite<Law, NoLayers>(layout, stiffness, bending, inverse, u, out, scratch);
+    };
+    return stiffness.relief > 0.0F ? sweep(Relieved{stiffness.relief}) : sweep(ByStretch{});
 }
 
 using ApplyFinite = decltype(Kernels::applyFinite);

@@ -2,6 +2,8 @@
 
 #include <chainmail/kernels.h>
 
+#include <type_traits>
+
 namespace palpate::chainmail {
 
 namespace {
@@ -128,11 +130,61 @@ inline void hourglass(const Spread& s, Lanes mu, Lanes lambda, const Modes (&m)[
     }
 }
 
-// The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
-// Adds to g the gradient of that energy, and returns twice the energy.
+// How bending modes count in axes that stretch: with all of F,
+struct ByStretch {};
+
+// or less, see CellStiffness::relief.
+struct Relieved {
+    float relief;
+};
+
+// Each column of F = I + f times its factor, which is 1 - 4/3 relief (q y / (q^2 + y^2))^2 with y = n - 1 > 0, n the square
+// of the column's length: a third less than 1 at most, where y = q.
+struct RelievedColumns {
+    Lanes by[3][3];             // factor F, less I
+    Lanes factor[3], slope[3];  // and its slope by n
+
+    RelievedColumns(const Lanes (&f)[3][3], float relief) noexcept
+    {
+        constexpr float q2 = 1.7F * 1.7F;
+        const float most = 4.0F / 3.0F * q2 * relief;
+#pragma GCC unroll 3
+        for (int j = 0; j < 3; ++j) {
+            // n - 1 without the difference of large numbers
+            const Lanes over = 2.0F * f[j][j] + f[0][j] * f[0][j] + f[1][j] * f[1][j] + f[2][j] * f[2][j];
+            const Lanes y = over > 0.0F ? over : Lanes{};
+            const Lanes part = 1.0F / (q2 + y * y);
+            const Lanes t = y * part;
+            const Lanes less = most * t * t;
+            factor[j] = 1.0F - less;
+            slope[j] = (-2.0F * most) * t * (q2 - y * y) * part * part;
+#pragma GCC unroll 3
+            for (int i = 0; i < 3; ++i) {
+                by[i][j] = i == j ? f[i][j] - less * (1.0F + f[i][j]) : factor[j] * f[i][j];
+            }
+        }
+    }
+
+    // From the gradient by the columns times their factors to that by F.
+    void pull(const Lanes (&f)[3][3], Lanes (&g)[3][3]) const noexcept
+    {
+#pragma GCC unroll 3
+        for (int j = 0; j < 3; ++j) {
+            const Lanes along = g[j][j] + f[0][j] * g[0][j] + f[1][j] * g[1][j] + f[2][j] * g[2][j];
+            const Lanes turned = 2.0F * slope[j] * along;
+#pragma GCC unroll 3
+            for (int i = 0; i < 3; ++i) {
+                g[i][j] = factor[j] * g[i][j] + turned * (i == j ? 1.0F + f[i][j] : f[i][j]);
+            }
+        }
+    }
+};
+
+// The same in axes that turn and stretch with the cell: with F = I + f its mean deformation gradient, a mode m becomes
+// F^T m. Adds to g the gradient of that energy by the modes, and sets that by F; returns twice the energy.
 template <typename Filled>
-[[gnu::always_inline]] inline Lanes hourglassTurned(const Filled& filled, Lanes mu, Lanes lambda, float quarter,
-                                                    const Lanes (&f)[3][3], const Modes (&m)[3], Modes (&g)[3]) noexcept
+[[gnu::always_inline]] inline Lanes hourglassBy(const Filled& filled, Lanes mu, Lanes lambda, const Lanes (&f)[3][3],
+                                                const Modes (&m)[3], Modes (&g)[3], Lanes (&byF)[3][3]) noexcept
 {
     Modes b[3];
     Modes w[3];
@@ -151,13 +203,35 @@ template <typename Filled>
         g[i].yz = w[i].yz + f[i][0] * w[0].yz + f[i][1] * w[1].yz + f[i][2] * w[2].yz;
         g[i].zx = w[i].zx + f[i][0] * w[0].zx + f[i][1] * w[1].zx + f[i][2] * w[2].zx;
         g[i].xyz = w[i].xyz + f[i][0] * w[0].xyz + f[i][1] * w[1].xyz + f[i][2] * w[2].xyz;
-        const Lanes byF[3] = {m[i].xy * w[0].xy + m[i].yz * w[0].yz + m[i].zx * w[0].zx + m[i].xyz * w[0].xyz,
-                              m[i].xy * w[1].xy + m[i].yz * w[1].yz + m[i].zx * w[1].zx + m[i].xyz * w[1].xyz,
-                              m[i].xy * w[2].xy + m[i].yz * w[2].yz + m[i].zx * w[2].zx + m[i].xyz * w[2].xyz};
-        g[i].x += quarter * byF[0];
-        g[i].y += quarter * byF[1];
-        g[i].z += quarter * byF[2];
+#pragma GCC unroll 3
+        for (int j = 0; j < 3; ++j) {
+            byF[i][j] = m[i].xy * w[j].xy + m[i].yz * w[j].yz + m[i].zx * w[j].zx + m[i].xyz * w[j].xyz;
+        }
         twice += w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+    }
+    return twice;
+}
+
+// The same; adds to g the gradient by the modes of F besides. @param quarter  1 / 4 h: F less I by those modes
+template <typename Filled, typename Bending>
+[[gnu::always_inline]] inline Lanes hourglassTurned(const Filled& filled, Lanes mu, Lanes lambda, float quarter,
+                                                    Bending bending, const Lanes (&f)[3][3], const Modes (&m)[3],
+                                                    Modes (&g)[3]) noexcept
+{
+    Lanes byF[3][3];
+    Lanes twice;
+    if constexpr (std::is_same_v<Bending, Relieved>) {
+        const RelievedColumns columns(f, bending.relief);
+        twice = hourglassBy(filled, mu, lambda, columns.by, m, g, byF);
+        columns.pull(f, byF);
+    } else {
+        twice = hourglassBy(filled, mu, lambda, f, m, g, byF);
+    }
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+        g[i].x += quarter * byF[i][0];
+        g[i].y += quarter * byF[i][1];
+        g[i].z += quarter * byF[i][2];
     }
     return twice;
 }

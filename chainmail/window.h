@@ -133,22 +133,34 @@ struct Window {
     Floats tissue;    // nodes of a cell with tissue
     WindowFragments fragments;
     std::array<Floats, fieldCount> fields;
+    float relief = 0;     // CellStiffness::relief of its cells
     float weight = 0.2F;  // of the smoother
 
     float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     CellStiffness stiffness() const noexcept
     {
-        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling(), relief};
     }
     CellStiffness uncovered() const noexcept
     {
-        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
+        return {uncoveredMu.data(),
+                uncoveredLambda.data(),
+                stiffening.data(),
+                layers.view(),
+                cuts.view(),
+                cuts.filling(),
+                relief};
     }
     CellStiffness term(std::size_t i) const noexcept
     {
-        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer),
-                cuts.view(),        cuts.filling()};
+        return {terms[i].mu.data(),
+                terms[i].lambda.data(),
+                stiffening.data(),
+                layers.with(terms[i].layer),
+                cuts.view(),
+                cuts.filling(),
+                relief};
     }
     Index3 size() const noexcept { return box; }
     /// Node (0, 0, 0) of this window in the next coarser one.

@@ -51,7 +51,7 @@ struct Cells {
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
     chainmail::CellStiffness stiffness() const
     {
-        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling(), relief};
     }
 
     /// Moduli of one cell [Pa].
@@ -136,6 +136,7 @@ struct Cells {
     }
 
     chainmail::Layout layout;
+    float relief = 0;  // CellStiffness::relief
     chainmail::Floats mu, lambda, stiffening;
     chainmail::LayerFields layers;
     chainmail::CutFields cuts;

@@ -260,7 +260,7 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
 TEST(ElasticDeep, TissueThatFrictionDragsAlongStaysInContact)
 {
     const ElasticBody body = softBlock();
-    for (const double friction : {0.3, 0.6, 2.0}) {
+    for (const double friction : {0.1, 0.3, 0.6, 2.0}) {
         Way way(body, middle - Vec3(8e-3, 0.0, 0.0), 6e-3, 0.0, asInASession);
         way.friction = friction;
         way.to(7.8e-3);

@@ -31,6 +31,7 @@ TEST(ElasticFinite, RotationsCostNothing)
         moduli += 32.0 * static_cast<double>(mu);
     }
     for (const double angle : {0.2, 1.0, 2.5, 3.1}) {
+        cells.relief = angle > 1.0 ? 1.0F : 0.0F;
         const Mat3 turn(glm::rotate(glm::dmat4(1.0), angle, glm::normalize(Vec3(0.3, -0.8, 0.5))));
         cells.move([&](Index3 n) { return (turn - Mat3(1.0)) * (Vec3(n) - Vec3(5, 3, 3)); });
         const double energy = cells.applyFinite();
@@ -174,12 +175,38 @@ TEST(ElasticFinite, ForceIsTheDerivativeOfTheEnergy)
     Cells cells = randomCells(random);
     cells.stiffen(3.0);
     Cells direction = cells;
-    for (int i = 0; i < 5; ++i) {
-        cells.moveRandom(0.3, random);
+    for (int i = 0; i < 10; ++i) {
+        cells.relief = 0.5F * static_cast<float>(i % 3);
+        cells.moveRandom(i < 5 ? 0.3 : 0.6, random);
         direction.moveRandom(1.0, random);
         const double slope = tests::energySlope(cells, direction.u, 4e-3F);
         const double scale = std::sqrt(dot(cells, cells.out, cells.out) * dot(cells, direction.u, direction.u));
         EXPECT_NEAR(slope, dot(cells, direction.u, cells.out), 1e-3 * scale);
+    }
+}
+
+// A cell that is stretched to `a` along x and bent by u_x = c (x - 1/2) (z - 1/2): 4/3 mu (c / 4)^2, times the square of
+// the stretch and of the factor of CellStiffness::relief. That is 1 at rest and in compression, and 2/3 where a^2 = 2.7.
+TEST(ElasticFinite, AStretchedCellBendsByTheFactorThatIsSaid)
+{
+    constexpr double mu = 2.0, c = 0.4, q = 1.7;
+    Cells cells({2, 2, 2});
+    cells.fill(mu, 0.0);
+    const auto energy = [&](double a, double bent) {
+        cells.move([&](Index3 n) {
+            const Vec3 x = Vec3(n) - 0.5;
+            return Vec3((a - 1.0) * x.x + bent * x.x * x.z, 0.0, 0.0);
+        });
+        return cells.applyFinite();
+    };
+    for (const double a : {0.6, 1.0, 1.2, std::sqrt(2.7), 2.5, 6.0}) {
+        const double y = std::max(a * a - 1.0, 0.0);
+        for (const double relief : {0.0, 0.5, 1.0}) {
+            cells.relief = static_cast<float>(relief);
+            const double factor = a * (1.0 - 4.0 / 3.0 * relief * std::pow(q * y / (q * q + y * y), 2));
+            const double bending = 4.0 / 3.0 * mu * c * c / 16.0 * factor * factor;
+            EXPECT_NEAR(energy(a, c) - energy(a, 0.0), bending, 1e-5 * (bending + energy(a, 0.0))) << a << ' ' << relief;
+        }
     }
 }
 

@@ -68,7 +68,9 @@ TEST(ElasticSets, ApplyFiniteGivesTheSameForces)
 {
     std::minstd_rand random(2);
     for (const Index3 size : sizes()) {
-        expectSameBits(randomCells(size, random), [](const Kernels& k, Cells& c) {
+        Cells cells = randomCells(size, random);
+        cells.relief = 0.5F * static_cast<float>(size.x % 3);
+        expectSameBits(cells, [](const Kernels& k, Cells& c) {
             k.applyFinite(c.layout, c.stiffness(), 1.0F, c.u.data(), c.out.data(), c.scratch.data());
         });
     }
@@ -140,6 +142,7 @@ TEST(ElasticSets, ApplyFiniteGivesTheSameEnergy)
     std::minstd_rand random(3);
     for (const Index3 size : sizes()) {
         Cells c = randomCells(size, random);
+        c.relief = 0.5F * static_cast<float>(size.x % 3);
         const auto energy = [&](const Kernels& k) {
             return k.applyFinite(c.layout, c.stiffness(), 1.0F, c.u.data(), c.out.data(), c.scratch.data());
         };

@@ -101,14 +101,19 @@ TEST(DeepPress, PlacesStandForAWholeCell)
     EXPECT_EQ(sum, 16);
 }
 
+haptics::SessionModel modelOf(const std::string& name)
+{
+    auto scene = datasets::builtInScene(name).value();
+    scene.model.level = datasets::ModelLevel::spring;  // the press makes its own body
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    return haptics::buildModel(std::move(scene), std::move(tissue));
+}
+
 // 3 % at 1 and 1.5 radii, on the way in and out, and no pull in any tick. A surface that slips around the sphere pulls it
 // inwards here, by more than a newton.
 TEST(DeepPress, TheBlocksForceIsThatOfFiniteElementsToOneAndAHalfRadii)
 {
-    auto scene = datasets::builtInScene("block").value();
-    scene.model.level = datasets::ModelLevel::spring;  // the press makes its own body
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    const haptics::SessionModel model = haptics::buildModel(std::move(scene), std::move(tissue));
+    const haptics::SessionModel model = modelOf("block");
     auto cases = loadDeepCases(PALPATE_REFERENCES "/deep.csv");
     const auto block = std::ranges::find(cases, "block", &DeepCase::scene);
     ASSERT_NE(block, cases.end());
@@ -125,6 +130,27 @@ TEST(DeepPress, TheBlocksForceIsThatOfFiniteElementsToOneAndAHalfRadii)
     }
     EXPECT_EQ(press.pull, 0.0);
     EXPECT_GT(press.ticks, 1600U);
+}
+
+// Over the lump cells under the ball are stretched to twice their width: 5 % too stiff where bending grows with the square
+// of the stretch.
+TEST(DeepPress, OverTheLumpTheForceIsThatOfFiniteElementsToTwoRadii)
+{
+    const haptics::SessionModel model = modelOf("find-lump");
+    auto cases = loadDeepCases(PALPATE_REFERENCES "/deep.csv");
+    const auto ball =
+        std::ranges::find_if(cases, [](const DeepCase& c) { return c.scene == "find-lump" && c.tool.length <= 0.0; });
+    ASSERT_NE(ball, cases.end());
+    const double radius = ball->tool.radius;
+    std::erase_if(ball->references,
+                  [&](const DeepReference& r) { return r.way == PressWay::out || r.depth < 1.45 * radius; });
+    ASSERT_GE(ball->references.size(), 2U);
+    const DeepPress press = pressDeep(model, *ball, datasets::elasticSetting("default"), {.places = gridPlaces().first(1)});
+    for (const DeepLook& look : press.looks) {
+        EXPECT_LT(std::abs(look.errorPercent()), look.depth > 1.55 * radius ? 4.0 : 2.0)
+            << wayName(look.way) << ", " << 1e3 * look.depth << " mm";
+    }
+    EXPECT_EQ(press.pull, 0.0);
 }
 
 }  // namespace
