@@ -52,6 +52,17 @@ struct Samples {
         return sum;
     }
 
+    // Whether node n and its six neighbours, which it has, are on one side of the value.
+    bool isOneSided(Index3 n, float iso) const
+    {
+        const float* own = values.data() + grid.offset(n);
+        const std::ptrdiff_t row = grid.size.x;
+        const std::ptrdiff_t slice = row * grid.size.y;
+        const bool isAbove = *own > iso;
+        return (own[-1] > iso) == isAbove && (own[1] > iso) == isAbove && (own[-row] > iso) == isAbove &&
+               (own[row] > iso) == isAbove && (own[-slice] > iso) == isAbove && (own[slice] > iso) == isAbove;
+    }
+
     Vec3f gradient(Vec3f p) const
     {
         const float h = 0.5F;
@@ -105,6 +116,11 @@ bool surfaceNear(const Samples& f, float iso, Index3 n, SurfacePoint& found)
     return true;
 }
 
+bool isInner(const NodeGrid& grid, Index3 n)
+{
+    return grid.contains(n - 1) && grid.contains(n + 1);
+}
+
 // All surface points, entered at their nodes.
 std::vector<SurfacePoint> collectSurface(const Samples& f, float iso, std::vector<std::int32_t>& nearest)
 {
@@ -115,6 +131,9 @@ std::vector<SurfacePoint> collectSurface(const Samples& f, float iso, std::vecto
         for (int y = 0; y < grid.size.y; ++y) {
             for (int x = 0; x < grid.size.x; ++x) {
                 const Index3 n(x, y, static_cast<int>(z));
+                if (isInner(grid, n) && f.isOneSided(n, iso)) {
+                    continue;
+                }
                 SurfacePoint point;
                 if (surfaceNear(f, iso, n, point)) {
                     found[z].emplace_back(grid.offset(n), point);

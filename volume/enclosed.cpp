@@ -54,20 +54,23 @@ using Corners = std::array<float, 8>;
 void addSamples(const Corners& corners, int side, Histogram& histogram)
 {
     const double each = 1.0 / (side * side * side);
-    const auto place = [side](int part) { return (static_cast<float>(part) + 0.5F) / static_cast<float>(side); };
-    std::array<std::array<float, 4>, maxSide> edges;  // on the four along x, by the place
-    for (int x = 0; x < side; ++x) {
+    const auto parts = static_cast<std::size_t>(side);
+    std::array<float, maxSide> places;                // of the middles, 0 to 1
+    std::array<std::array<float, 4>, maxSide> edges;  // values there on the four edges along x
+    for (std::size_t x = 0; x < parts; ++x) {
+        places[x] = (static_cast<float>(x) + 0.5F) / static_cast<float>(side);
         for (std::size_t e = 0; e < 4; ++e) {
-            edges[static_cast<std::size_t>(x)][e] = corners[2 * e] + place(x) * (corners[2 * e + 1] - corners[2 * e]);
+            edges[x][e] = corners[2 * e] + places[x] * (corners[2 * e + 1] - corners[2 * e]);
         }
     }
-    for (int z = 0; z < side; ++z) {
-        for (int s = 0; s < side * side; ++s) {
-            const std::array<float, 4>& edge = edges[static_cast<std::size_t>(s % side)];
-            const float y = place(s / side);
-            const float near = edge[0] + y * (edge[1] - edge[0]);
-            const float far = edge[2] + y * (edge[3] - edge[2]);
-            histogram.add(near + place(z) * (far - near), each);
+    for (std::size_t z = 0; z < parts; ++z) {
+        for (std::size_t y = 0; y < parts; ++y) {
+            for (std::size_t x = 0; x < parts; ++x) {
+                const std::array<float, 4>& edge = edges[x];
+                const float near = edge[0] + places[y] * (edge[1] - edge[0]);
+                const float far = edge[2] + places[y] * (edge[3] - edge[2]);
+                histogram.add(near + places[z] * (far - near), each);
+            }
         }
     }
 }

@@ -64,12 +64,10 @@ public:
                 if (y > 0) {
                     takeRow(y, z, -size_.x);
                 }
-                sweepRow(y, z);
+                sweepRow(y, z, {0, size_.x - 1});
             }
             for (int y = size_.y - 2; y >= 0; --y) {
-                if (takeRow(y, z, size_.x)) {  // a row that is as its sweep left it has nothing to gain by another
-                    sweepRow(y, z);
-                }
+                sweepRow(y, z, takeRow(y, z, size_.x));  // nothing changes where a row is as its sweep left it
             }
         }
     }
@@ -95,21 +93,27 @@ private:
     {
         return static_cast<std::ptrdiff_t>(size_.x) * (y + static_cast<std::ptrdiff_t>(size_.y) * z);
     }
-    // Whether a node took a point.
-    bool takeRow(int y, int z, std::ptrdiff_t from)
+    // The first and last node that took a point; of none, the last is before the first.
+    std::pair<int, int> takeRow(int y, int z, std::ptrdiff_t from)
     {
-        bool any = false;
+        int first = size_.x;
+        int last = -1;
         for (int x = 0; x < size_.x; ++x) {
-            any |= take({x, y, z}, row(y, z) + x, from);
+            if (take({x, y, z}, row(y, z) + x, from)) {
+                first = std::min(first, x);
+                last = x;
+            }
         }
-        return any;
+        return {first, last};
     }
-    void sweepRow(int y, int z)
+    // Of a row in which nodes of `changed` alone have something to give.
+    void sweepRow(int y, int z, std::pair<int, int> changed)
     {
-        for (int x = 1; x < size_.x; ++x) {
-            take({x, y, z}, row(y, z) + x, -1);
+        int last = changed.second;
+        for (int x = changed.first + 1; x < size_.x; ++x) {
+            last = take({x, y, z}, row(y, z) + x, -1) ? std::max(last, x) : last;
         }
-        for (int x = size_.x - 2; x >= 0; --x) {
+        for (int x = last - 1; x >= 0; --x) {
             take({x, y, z}, row(y, z) + x, 1);
         }
     }
