@@ -8,6 +8,8 @@
 #include <haptics/probe_placement.h>
 
 #include <fmt/ranges.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/parallel_invoke.h>
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -99,8 +101,9 @@ bool anyWalls(const volume::Tissue& tissue)
                                [&](const auto& s) { return tissue.table().rows[s.tissue].wallSpacing > 0.0; });
 }
 
-GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& grid, const std::string& name,
-                         const std::string& what, const std::string& scene)
+// Without its distances.
+GuardedStructure guarded(const volume::Tissue& tissue, const std::string& name, const std::string& what,
+                         const std::string& scene)
 {
     GuardedStructure s;
     s.name = name;
@@ -109,8 +112,19 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
         throw base::error("{}: {} '{}' is not in the volume; it has: {}", scene, what, name,
                           fmt::join(datasets::solidNames(tissue), ", "));
     }
-    s.distance = tissue.distanceTo(s.labels, grid);
     return s;
+}
+
+std::vector<GuardedStructure> structuresOf(const datasets::Scene& scene, const volume::Tissue& tissue)
+{
+    std::vector<GuardedStructure> structures;
+    structures.push_back(guarded(tissue, scene.target, "target", scene.name));
+    for (const auto& vital : scene.vital) {
+        structures.push_back(guarded(tissue, vital.name, "vital structure", scene.name));
+        structures.back().warnDistance = vital.warnDistance;
+        structures.back().gain = vital.gain;
+    }
+    return structures;
 }
 
 // A plan that names a point alone samples the structure in which the point lies.
@@ -179,17 +193,19 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     }
     const auto grid = surfaceGrid(*tissue);
     const auto coarse = fieldGrid(*tissue, structureNodes);
-    std::vector<GuardedStructure> structures;
-    structures.push_back(guarded(*tissue, coarse, scene.target, "target", scene.name));
-    for (const auto& vital : scene.vital) {
-        structures.push_back(guarded(*tissue, coarse, vital.name, "vital structure", scene.name));
-        structures.back().warnDistance = vital.warnDistance;
-        structures.back().gain = vital.gain;
-    }
-    auto surface = tissue->distanceToBody(grid);
+    std::vector<GuardedStructure> structures = structuresOf(scene, *tissue);
+    volume::DistanceField surface;
+    volume::ScalarField modulus;
+    // The sweeps of one field are two threads' work at most.
+    tbb::parallel_invoke([&] { surface = tissue->distanceToBody(grid); },
+                         [&] { modulus = tissue->youngsModulusOn(coarse); },
+                         [&] {
+                             tbb::parallel_for_each(structures, [&](GuardedStructure& structure) {
+                                 structure.distance = tissue->distanceTo(structure.labels, coarse);
+                             });
+                         });
     const auto approach =
         isSession ? approachOf(scene, posture, surface, structures) : approachIfAny(scene, posture, surface, structures);
-    auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
     if (isSession) {
         checkToolFits(scene, lattice);

@@ -1,5 +1,7 @@
 #include <volume/blurred_surface.h>
 
+#include <volume/paraboloid.h>
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
@@ -107,98 +109,6 @@ Density projected(const Blur& blur, Vec3 normal)
     return density;
 }
 
-// Height over a plane, a + b u + c v + d u^2 + e u v + f v^2, by weighted least squares.
-class Paraboloid {
-public:
-    Paraboloid(const SurfacePoint& top, float reach) : origin_(top.at), normal_(top.normal), reach_(reach)
-    {
-        const Vec3f other = std::abs(normal_.x) < 0.7F ? Vec3f(1, 0, 0) : Vec3f(0, 1, 0);
-        u_ = glm::normalize(glm::cross(normal_, other));
-        v_ = glm::cross(normal_, u_);
-    }
-
-    // A point, if it is within reach and may lie on the same sheet of the surface: a layer below or above has the same
-    // normals.
-    void add(const SurfacePoint& point)
-    {
-        constexpr float level = 0.5F;  // height of points beside the origin [spacings]
-        constexpr float slope = 0.3F;  // and how it grows with their distance
-        const Vec3f way = (point.at - origin_) / reach_;
-        const float far = glm::dot(way, way);
-        if (far >= 1.0F || std::abs(glm::dot(way, normal_)) > level / reach_ + slope * std::sqrt(far)) {
-            return;
-        }
-        const float likeness = 1.0F - (1.0F - glm::dot(point.normal, normal_)) / unlike;
-        if (likeness <= 0.0F) {
-            return;
-        }
-        const double weight = static_cast<double>((1.0F - far) * (1.0F - far) * likeness * likeness);
-        const double u = glm::dot(way, u_);
-        const double v = glm::dot(way, v_);
-        const double w = glm::dot(way, normal_);
-        const std::array<double, 6> row{1.0, u, v, u * u, u * v, v * v};
-        for (std::size_t i = 0; i < 6; ++i) {
-            for (std::size_t j = 0; j <= i; ++j) {
-                matrix_[i][j] += weight * row[i] * row[j];
-            }
-            right_[i] += weight * row[i] * w;
-        }
-        ++count_;
-    }
-
-    // By Cholesky's factors. False where the points do not tell.
-    bool solve()
-    {
-        constexpr int fewest = 10;
-        constexpr double leastPivot = 0.05;
-        if (count_ < fewest) {
-            return false;
-        }
-        for (std::size_t i = 0; i < 6; ++i) {
-            for (std::size_t j = 0; j <= i; ++j) {
-                double sum = matrix_[i][j];
-                for (std::size_t k = 0; k < j; ++k) {
-                    sum -= matrix_[i][k] * matrix_[j][k];
-                }
-                if (i == j && sum < leastPivot * leastPivot * matrix_[0][0]) {
-                    return false;
-                }
-                matrix_[i][j] = i == j ? std::sqrt(sum) : sum / matrix_[j][j];
-            }
-        }
-        for (std::size_t i = 0; i < 6; ++i) {
-            for (std::size_t k = 0; k < i; ++k) {
-                right_[i] -= matrix_[i][k] * right_[k];
-            }
-            right_[i] /= matrix_[i][i];
-        }
-        for (std::size_t i = 6; i-- > 0;) {
-            for (std::size_t k = i + 1; k < 6; ++k) {
-                right_[i] -= matrix_[k][i] * right_[k];
-            }
-            right_[i] /= matrix_[i][i];
-        }
-        return true;
-    }
-
-    float height() const { return static_cast<float>(right_[0]) * reach_; }
-    // Sum of the second derivatives: negative where the structure is convex.
-    float bend() const { return static_cast<float>(2.0 * (right_[3] + right_[5])) / reach_; }
-    Vec3f normal() const
-    {
-        return glm::normalize(normal_ - static_cast<float>(right_[1]) * u_ - static_cast<float>(right_[2]) * v_);
-    }
-
-    static constexpr float unlike = 0.2F;  // 1 less the cosine between normals from which on a point does not count
-
-private:
-    Vec3f origin_, normal_, u_, v_;
-    float reach_;
-    std::array<std::array<double, 6>, 6> matrix_{};  // lower triangle
-    std::array<double, 6> right_{};
-    int count_ = 0;
-};
-
 // Works on the nodes whose cells the blurred edge runs through.
 class Band {
 public:
@@ -305,6 +215,7 @@ private:
     // Points by rows of nodes along x.
     struct Rows {
         std::vector<SurfacePoint> points;
+        std::vector<float> x;              // of each point
         std::vector<std::uint32_t> first;  // of each row, and the end
     };
 
@@ -318,7 +229,7 @@ private:
         const auto row = [&](const SurfacePoint& point) {
             return rowOf(glm::clamp(Index3(glm::round(point.at)), Index3(0), grid_.size - 1));
         };
-        Rows rows{std::vector<SurfacePoint>(points.size()), {}};
+        Rows rows{std::vector<SurfacePoint>(points.size()), std::vector<float>(points.size()), {}};
         rows.first.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
         for (const SurfacePoint& point : points) {
             ++rows.first[row(point) + 1];
@@ -326,7 +237,9 @@ private:
         std::partial_sum(rows.first.begin(), rows.first.end(), rows.first.begin());
         std::vector<std::uint32_t> next(rows.first.begin(), rows.first.end() - 1);
         for (const SurfacePoint& point : points) {
-            rows.points[next[row(point)]++] = point;
+            const std::uint32_t k = next[row(point)]++;
+            rows.points[k] = point;
+            rows.x[k] = point.at.x;
         }
         return rows;
     }
@@ -380,24 +293,34 @@ private:
         return along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
     }
 
+    // Adds those of the points from `first` to `end`, in this order, that are within reach along x: most are farther away,
+    // and are passed over without a branch.
+    static void addNear(const Rows& rows, std::uint32_t first, std::uint32_t end, Paraboloid& paraboloid)
+    {
+        constexpr std::uint32_t some = 64;
+        std::array<std::uint32_t, some> near;
+        for (std::uint32_t begin = first; begin < end; begin += some) {
+            std::size_t count = 0;
+            for (std::uint32_t o = begin; o < std::min(begin + some, end); ++o) {
+                near[count] = o;
+                count += paraboloid.isNearAlongX(rows.x[o]) ? 1 : 0;
+            }
+            for (std::size_t i = 0; i < count; ++i) {
+                paraboloid.add(rows.points[near[i]]);
+            }
+        }
+    }
+
     std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
     {
-        const SurfacePoint& own = found.points[k];
-        Paraboloid paraboloid(own, reach);
+        Paraboloid paraboloid(found.points[k], reach);
         const Rows& rows = reach > widestOfAll ? sparse_ : all_;
-        const auto addRow = [&](std::size_t row) {
-            for (std::size_t o = rows.first[row]; o < rows.first[row + 1]; ++o) {
-                if (std::abs(rows.points[o].at.x - own.at.x) < reach) {  // most of a row is farther away
-                    paraboloid.add(rows.points[o]);
-                }
-            }
-        };
         const Index3 n = grid_.node(found.nodes[k]);
         const int nodes = static_cast<int>(std::ceil(reach));
+        const int lowest = std::max(n.y - nodes, 0);
+        const int highest = std::min(n.y + nodes, grid_.size.y - 1);
         for (int z = std::max(n.z - nodes, 0); z <= std::min(n.z + nodes, grid_.size.z - 1); ++z) {
-            for (int y = std::max(n.y - nodes, 0); y <= std::min(n.y + nodes, grid_.size.y - 1); ++y) {
-                addRow(rowOf({n.x, y, z}));
-            }
+            addNear(rows, rows.first[rowOf({0, lowest, z})], rows.first[rowOf({0, highest, z}) + 1], paraboloid);
         }
         return paraboloid.solve() ? std::optional(paraboloid) : std::nullopt;
     }

@@ -33,6 +33,16 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
 /// Volume where the trilinear interpolant of `distance` is negative [m^3].
 double enclosedVolume(const NodeGrid& grid, std::span<const float> distance);
 
+/// A volume [m^3], and the distances that it was computed from: empty where a part of the grid was enough.
+struct Enclosed {
+    double volume = 0;
+    std::vector<float> distance;
+};
+
+/// What signedDistance(grid, fraction, surface, 1) encloses. Around a small surface it is computed, to the same bits, from
+/// the nodes near it.
+Enclosed enclosedBy(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface);
+
 /// The value between 0.05 and 0.6 whose isosurface encloses `volume` [m^3]; 0.5 when that does within 0.5 %.
 /// At most nine tenths of the largest fraction, so that something is inside. Source of `fraction`: nodes x 1, trilinear.
 float isoForVolume(const NodeGrid& grid, std::span<const float> fraction, double volume);

@@ -270,18 +270,21 @@ DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, c
         smoothAxis(fraction, grid, smoothed, axis, passes[axis]);
     }
     const BlurredSurface surface = blurredSurface(grid, fraction, blurOf(tissue, grid, passes));
-    DistanceField field{{grid, signedDistance(grid, fraction, surface, 1.0F)}};
-    const double missing = 1.0 - enclosedVolume(grid, field.values) / volume;
     const double shell = surface.shell * std::pow(grid.spacing, 3) / volume;
+    Enclosed enclosed = shell > tooThin ? Enclosed{} : enclosedBy(grid, fraction, surface);
+    const double missing = 1.0 - enclosed.volume / volume;
     if (std::abs(missing) > tooThin || shell > tooThin) {
-        field.values = signedDistance(grid, fraction, isoForVolume(grid, fraction, volume));
+        DistanceField field{{grid, signedDistance(grid, fraction, isoForVolume(grid, fraction, volume))}};
         keepVolume(grid, field.values, volume);
-    } else if (std::abs(missing) > exact && shell > exact) {
+        return field;
+    }
+    if (std::abs(missing) > exact && shell > exact) {
         // The way back is of first order: on bodies that are curved all over, their volume says how much of it is due.
         const double weight = std::clamp(1.0 + missing / shell, 0.75, 1.25);
-        field.values = signedDistance(grid, fraction, surface, static_cast<float>(weight));
+        return {{grid, signedDistance(grid, fraction, surface, static_cast<float>(weight))}};
     }
-    return field;
+    return {
+        {grid, enclosed.distance.empty() ? signedDistance(grid, fraction, surface, 1.0F) : std::move(enclosed.distance)}};
 }
 
 void checkGrid(const NodeGrid& grid)
