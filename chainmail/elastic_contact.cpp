@@ -82,7 +82,8 @@ int piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
         return 1;
     }
     const Vec3 axis = tool.shape.b - tool.shape.a;
-    const bool lies = std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
+    const bool lies = glm::length(axis) > radiusOfPatch(tool) &&
+                      std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
     const bool isDeep = glm::length(tool.pushed) > deep * tool.shape.widest();
     const double patch = isDeep ? closeness.back().radius : radiusOfPatch(tool) / spacing;
     const auto* const found = std::find_if(closeness.begin() + (lies ? 1 : 0), closeness.end(),
@@ -185,7 +186,10 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     const double ahead = glm::dot(a - b, inward);
     const Vec3 place = glm::fract(((ahead < 0.0 ? b : a) - tool.pushed - grid.origin) / grid.spacing);
     const Vec3 f = place * (1.0 - place), across = 1.0 - inward * inward;
-    const double isRound = tool.shape.a == tool.shape.b ? 1.0 : std::min(std::abs(ahead) / depth, 1.0);
+    // A capsule presses as a ball does where it stands on its end, and where it is short beside its patch.
+    const Vec3 lying = a - b - ahead * inward;
+    const double isRound =
+        std::clamp(std::max(std::abs(ahead) / depth, 1.0 - glm::length(lying) / radiusOfPatch(tool)), 0.0, 1.0);
     const double sum = glm::dot(across, f), square = glm::dot(across, f * f);
     return {glm::mix(mean.sum, sum, isRound), glm::mix(mean.square, square, isRound),
             glm::mix(mean.product, 0.5 * (sum * sum - square), isRound)};

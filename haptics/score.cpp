@@ -338,14 +338,17 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
     if (distance <= nearest_ || std::isfinite(record.ahead.structure[0])) {
         nearest_ = std::min(nearest_, distance);
         atTarget_ = record.inserted;
+        handAtTarget_ = record.device.position;
     }
     // What the gun took of it lay ahead of the tip, and does no more.
     if (record.fired && record.core.targetLength > 0.0) {
         nearest_ = 0.0;
         atTarget_ = record.inserted + record.core.targetLength;
     }
-    // No tip is farther beyond the target than from it.
-    double beyond = std::min(record.inserted - atTarget_, distance);
+    // No tip is farther beyond the target than from it, nor than the hand went: skin that gives way springs back over the
+    // shaft.
+    const double pushed = glm::distance(record.device.position, handAtTarget_);
+    double beyond = std::min({record.inserted - atTarget_, distance, pushed});
     // The tissue lets go of the shaft, which slides on while the hand stands.
     if (shot_) {
         beyond = std::min(beyond, std::max(0.0, shot_->second) + glm::distance(record.device.position, shot_->first));

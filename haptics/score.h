@@ -191,6 +191,7 @@ private:
     bool withdrawing_ = false, touched_ = false;
     // Of this way in: least distance to the target, length inside where that was, and the largest.
     double nearest_ = std::numeric_limits<double>::infinity(), atTarget_ = 0, furthest_ = 0;  // [m]
+    Vec3 handAtTarget_{0.0};                                                                  // [m]
     // The last shot of this way in: where the device was, and how much deeper than at the target [m].
     std::optional<std::pair<Vec3, double>> shot_;
     JerkMeter jerk_;

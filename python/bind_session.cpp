@@ -4,15 +4,18 @@
 
 #include <base/error.h>
 #include <haptics/record_bounds.h>
+#include <haptics/trainee.h>
 #include <session/devices.h>
 #include <session/figures.h>
 #include <volume/direction.h>
 
+#include <fmt/ranges.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -204,6 +207,9 @@ py::array perform(SessionBox& box, const std::string& trainee, const py::object&
     base::failIf(rate != 1.0 / haptics::tickSeconds,
                  "perform: the model is of a record at {:g} Hz, and simulated hands move at 1000 Hz: use run()", rate);
     const LiveSession::Use use(box.live);
+    const std::vector<std::string> skills = haptics::skillNames();
+    base::failIf(trainee != "script" && std::ranges::find(skills, trainee) == skills.end(),
+                 "trainee '{}': there are script, {}", trainee, fmt::join(skills, ", "));
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
     request.seed = seedOf(seed, "seed");

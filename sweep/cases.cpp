@@ -101,6 +101,7 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
     }
     toml::table* table = &root;
     const auto parts = base::splitAt('.', key);
+    base::failIf(std::ranges::find(parts, "") != parts.end(), "key '{}': has an empty part", key);
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
         toml::node* next = table->get(parts[i]);
         base::failIf(next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script"),

@@ -175,7 +175,8 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
     if (!fs::exists(file)) {
         base::failIf(given.empty(), "{}: holds no sweep: {}", folder_.native(),
                      hold ? "give a plan" : "name the folder of a sweep");
-        base::failIf(fs::exists(folder_) && (!fs::is_directory(folder_) || !fs::is_empty(folder_)),
+        base::failIf(fs::exists(folder_) && !fs::is_directory(folder_), "{}: is a file: name a folder", folder_.native());
+        base::failIf(fs::exists(folder_) && !fs::is_empty(folder_),
                      "{}: is not empty and holds no sweep: choose another folder", folder_.native());
         plan_ = parsePlan(text.first, text.second, namedScene);
         base::checkOutputFolder(folder_);

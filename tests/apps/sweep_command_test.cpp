@@ -193,6 +193,7 @@ TEST_F(Sweep, DryRunSaysWhatItTakesAndLeavesNothing)
     EXPECT_NEAR(dry["estimated_s"].get<double>(), 30 * dry["case_s"].get<double>(), 1e-9);
     EXPECT_NEAR(dry["disk_mb"].get<double>(), 60 * 4096e-6, 1e-9);
     expectRefusal({"sweep", "-o", folder("s")}, "holds no sweep");
+    expectRefusal({"sweep", file, "-o", file}, "is a file");
     const std::string said = palpate({"sweep", file, "--dry-run", "--jobs", "1000"}).out;
     EXPECT_NE(said.find(" s on 1000 processes"), std::string::npos) << said;
     EXPECT_EQ(said.find(": 0 s on"), std::string::npos) << said;

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tuple>
@@ -24,6 +25,7 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
         tick.distance.fill(1);
         for (const auto& [inserted, from, on] : {std::tuple(53.4, 2.0, 2.0), {57.4, distance, ahead}}) {
             tick.inserted = inserted * 1e-3;
+            tick.device.position = {0, 0, -inserted * 1e-3};
             tick.distance[0] = from * 1e-3;
             tick.ahead.structure[0] = on * 1e-3;
             scorer.add(tick);
@@ -54,7 +56,7 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
     EXPECT_NEAR(afterShot(0.0, 0.0), 0.0, 1e-9) << "a miss";
     EXPECT_NEAR(afterShot(0.0, 20.0), 20.0, 1e-9) << "a miss";
 
-    // A miss, after which the shaft slides on by 4 mm; a second shot, and the hand has stood still all the time.
+    // A miss, after which the shaft slides on by 4 mm; a second shot, and the hand has stood still since the first.
     Scorer twice(synthetic::info());
     TickRecord shot;
     shot.phase = Phase::inserted;
@@ -62,6 +64,7 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
     for (const auto& [inserted, fired] :
          {std::pair(38.0, false), {43.0, true}, {47.0, false}, {47.0, true}, {51.0, false}}) {
         shot.inserted = inserted * 1e-3;
+        shot.device.position = {0, 0, -std::min(inserted, 43.0) * 1e-3};
         shot.distance[0] = (inserted - 36.0) * 1e-3;
         shot.fired = fired;
         twice.add(shot);
@@ -73,6 +76,24 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
     EXPECT_NEAR(beyond(3.8, 3.0), 0.0, 1e-9);
     EXPECT_NEAR(beyond(2.5, nowhere), 2.5, 1e-9);
     EXPECT_NEAR(beyond(9.0, nowhere), 4.0, 1e-9);
+}
+
+// Skin gives way under the needle, 62 mm before a target that its line meets beyond what it looks ahead: the tissue springs
+// back over the shaft by 5 mm, away from a hand that goes on by 0.2 mm. That is no depth beyond the target.
+TEST(Score, TissueThatSpringsBackOverTheShaftIsNoPush)
+{
+    Scorer scorer(synthetic::info());
+    TickRecord tick;
+    tick.ahead.structure.fill(std::numeric_limits<double>::infinity());
+    tick.distance.fill(1);
+    for (int i = 0; i < 40; ++i, ++tick.tick) {
+        tick.phase = Phase::inserted;
+        tick.device.position = Vec3(0.0, 0.02e-3 * i, 0.0);
+        tick.inserted = 0.02e-3 * i + (i < 20 ? 0.0 : 5e-3);
+        tick.distance[0] = 62e-3 - 0.02e-3 * i + (i < 20 ? 0.0 : 0.3e-3);
+        scorer.add(tick);
+    }
+    EXPECT_LT(scorer.score().beyondTarget, 0.4e-3);
 }
 
 }  // namespace

@@ -377,6 +377,7 @@ TEST(Score, DepthBeyondTheTargetIsFromWhereTheTipLeftIt)
         const double way = to > from ? 0.5 * millimetre : -0.5 * millimetre;
         for (double depth = from; std::abs(depth - to) > 1e-9; depth += way) {
             tick.inserted = depth;
+            tick.device.position = Vec3(0.0, depth, 0.0);
             tick.distance.fill(1);
             tick.distance[0] = std::abs(depth - 15 * millimetre) - 5 * millimetre;
             scorer.add(tick);

@@ -90,6 +90,9 @@ class Scenes(InFolder):
         for keys in ({"tissue.fat.youngs_kpa": masked[1]}, {"target.aim_mm": masked}):
             with self.subTest(keys), self.assertRaisesRegex(ValueError, "is a masked array"):
                 palpate.Scene("block").changed(keys)
+        for key in ("", ".", "tissue..x", "tissue.fat."):
+            with self.subTest(key), self.assertRaisesRegex(RuntimeError, "has an empty part"):
+                palpate.Scene("block").changed({key: 2})
         for point in (["1", "2", "3"], np.array(["1", "2", "3"]), [1j, 2, 3]):
             with self.subTest(point), self.assertRaisesRegex(ValueError, "target.aim_mm: give three numbers"):
                 palpate.Scene("block").changed({"target.aim_mm": point})

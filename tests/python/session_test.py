@@ -313,7 +313,7 @@ class Hands(InFolder):
 
     def test_a_hand_that_there_is_not_is_named(self):
         session = palpate.Session(palpate.Scene("block").changed({"model.level": "spring"}))
-        with self.assertRaisesRegex(RuntimeError, "trainee 'fool': there are "):
+        with self.assertRaisesRegex(RuntimeError, "trainee 'fool': there are script, "):
             session.perform("fool")
 
     def test_a_hand_that_does_not_fit_the_tool_has_no_advice_of_the_program(self):
