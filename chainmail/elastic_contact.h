@@ -235,7 +235,8 @@ struct Between {
     double square = 1.0 / 15.0;   // sum of both squares
     double product = 1.0 / 36.0;  // of both
 };
-/// Of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat.
+/// Of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat, unless it is
+/// shorter than its patch.
 Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
 
 /// By what cells around a point lack other compliance than those of the finest level that are full of soft tissue.
