@@ -138,29 +138,11 @@ struct Window {
 
     float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
-    CellStiffness stiffness() const noexcept
-    {
-        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling(), relief};
-    }
-    CellStiffness uncovered() const noexcept
-    {
-        return {uncoveredMu.data(),
-                uncoveredLambda.data(),
-                stiffening.data(),
-                layers.view(),
-                cuts.view(),
-                cuts.filling(),
-                relief};
-    }
+    CellStiffness stiffness() const noexcept { return stiffnessOf(mu, lambda, layers.view()); }
+    CellStiffness uncovered() const noexcept { return stiffnessOf(uncoveredMu, uncoveredLambda, layers.view()); }
     CellStiffness term(std::size_t i) const noexcept
     {
-        return {terms[i].mu.data(),
-                terms[i].lambda.data(),
-                stiffening.data(),
-                layers.with(terms[i].layer),
-                cuts.view(),
-                cuts.filling(),
-                relief};
+        return stiffnessOf(terms[i].mu, terms[i].lambda, layers.with(terms[i].layer));
     }
     Index3 size() const noexcept { return box; }
     /// Node (0, 0, 0) of this window in the next coarser one.
@@ -233,6 +215,10 @@ struct Window {
     void cover(const CellLevel& level, const Window& finer) noexcept;
 
 private:
+    CellStiffness stiffnessOf(const Floats& shear, const Floats& lame, const CellLayers& thin) const noexcept
+    {
+        return {shear.data(), lame.data(), stiffening.data(), thin, cuts.view(), cuts.filling(), relief};
+    }
     void placeBorder(bool coarsest) noexcept;
     void pullByFragments(const Window& finer) noexcept;
     void coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept;
