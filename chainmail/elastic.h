@@ -256,7 +256,7 @@ private:
     std::vector<occupancy::ShapeDistance> shapes_;
     struct FoundFor {
         occupancy::RoundCone shape;
-        int pieces = 1;  // piecesUnder()
+        Division pieces;
     };
     std::vector<FoundFor> foundFor_;            // the tools when the sites were looked for
     std::vector<PressedBox> pressed_;           // by each tool, when the sites were looked for

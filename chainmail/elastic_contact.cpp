@@ -38,11 +38,19 @@ constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
                                              {1.5, 0.021, -0.14, 0.49, 0.42},
                                              {1.75, 0.007, -0.10, 0.40, 0.27},
                                              {2.0, 0.0, 0.0, 0.0, 0.0}}};
+
+LackingAt lackingAt(double radius) noexcept
+{
+    const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radius,
+                                        [](const LackingAt& l, double r) { return l.radius < r; });
+    const LackingAt &to = *above, &from = *(above - 1);
+    const double t = std::clamp((radius - from.radius) / (to.radius - from.radius), 0.0, 1.0);
+    const auto at = [&](double LackingAt::*value) { return glm::mix(from.*value, to.*value, t); };
+    return {radius, at(&LackingAt::mean), at(&LackingAt::sum), at(&LackingAt::square), at(&LackingAt::product)};
+}
+
 // Cosine between a capsule and its way up to which it lies: what is small then is a strip, of many points.
 constexpr double steep = 0.7;
-// Depth in radii from which on the surface lies around a small tool: points as dense as its cells make them too stiff
-// there.
-constexpr double deep = 0.5;
 // Radius of a patch, in cells, up to which surface points lie as close to each other as that, in cells.
 struct Closeness {
     double radius, apart;
@@ -76,19 +84,32 @@ bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept
     return shape.a == shape.b || std::abs(glm::dot(normal, shape.b - shape.a) + shape.radiusB - shape.radiusA) > rounding;
 }
 
-int piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
+double wrapping(const ElasticTool& tool) noexcept
+{
+    return std::clamp(5.0 * glm::length(tool.pushed) / tool.shape.widest() - 2.0, 0.0, 1.0);
+}
+
+int Division::of(std::uint32_t point) const noexcept
+{
+    constexpr std::uint32_t golden = 2654435769U;  // of 2^32: points beside each other are in different eighths
+    return (point * golden) >> 29U < wholeEighths ? 1 : along;
+}
+
+Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
 {
     if (tool.pushed == Vec3(0.0)) {
-        return 1;
+        return {};
     }
+    const double patch = radiusOfPatch(tool) / spacing, whole = wrapping(tool);
     const Vec3 axis = tool.shape.b - tool.shape.a;
     const bool lies = glm::length(axis) > radiusOfPatch(tool) &&
                       std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
-    const bool isDeep = glm::length(tool.pushed) > deep * tool.shape.widest();
-    const double patch = isDeep ? closeness.back().radius : radiusOfPatch(tool) / spacing;
     const auto* const found = std::find_if(closeness.begin() + (lies ? 1 : 0), closeness.end(),
                                            [&](const Closeness& c) { return patch < c.radius; });
-    return found == closeness.end() ? 1 : static_cast<int>(std::ceil(edge / (found->apart * spacing)));
+    if (found == closeness.end() || whole >= 1.0) {
+        return {};
+    }
+    return {static_cast<int>(std::ceil(edge / (found->apart * spacing))), static_cast<unsigned>(8.0 * whole)};
 }
 
 namespace {
@@ -195,17 +216,13 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
             glm::mix(mean.product, 0.5 * (sum * sum - square), isRound)};
 }
 
-ResolvedShare::ResolvedShare(double radiusInCells, const Between& across) noexcept
+ResolvedShare::ResolvedShare(double radiusInCells, double between, const Between& across) noexcept
 {
     const Between mean;
-    const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
-                                        [](const LackingAt& l, double t) { return l.radius < t; });
-    const LackingAt &to = *above, &from = *(above - 1);
-    const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
-    const auto at = [&](double LackingAt::*value) { return glm::mix(from.*value, to.*value, t); };
-    mean_ = at(&LackingAt::mean);
-    uneven_ = at(&LackingAt::sum) * (across.sum - mean.sum) + at(&LackingAt::square) * (across.square - mean.square) +
-              at(&LackingAt::product) * (across.product - mean.product);
+    const LackingAt even = lackingAt(radiusInCells), uneven = lackingAt(between);
+    mean_ = even.mean;
+    uneven_ = uneven.sum * (across.sum - mean.sum) + uneven.square * (across.square - mean.square) +
+              uneven.product * (across.product - mean.product);
     const double fades = std::max(0.5 * radiusInCells, 1.0);
     compressible_ = 0.6 * std::min(4.0 * radiusInCells, 1.0) / (fades * fades * fades * fades);
     sliver_ = std::min(2.0 * radiusInCells, 1.0);

@@ -202,7 +202,7 @@ private:
                  const SurfaceCell& cell) noexcept
     {
         const double spacing = body_.levels.front().nodes.spacing, edge = body_.pieceEdge;
-        const int pieces = piecesUnder(tool, spacing, edge);
+        const Division all = piecesUnder(tool, spacing, edge);
         const double fine = 0.5 * smallPatch * smallPatch * spacing / tool.shape.widest();
         for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
             if (count_ == out_.size()) {
@@ -217,6 +217,7 @@ private:
             site.atRest = site.stiffness = siteStiffness(body_, point, tool);
             site.area = point.area;
             const bool added = addIfNear(shape, site);
+            const int pieces = all.of(i);
             if (added && pieces > 1 && static_cast<double>(point.area) > slight * edge * edge) {
                 divideLast(shape, pieces, pieces > 2 ? std::min(close, fine) : close);
             }
