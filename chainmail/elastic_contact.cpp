@@ -91,8 +91,14 @@ double wrapping(const ElasticTool& tool) noexcept
 
 int Division::of(std::uint32_t point) const noexcept
 {
-    constexpr std::uint32_t golden = 2654435769U;  // of 2^32: points beside each other are in different eighths
-    return (point * golden) >> 29U < wholeEighths ? 1 : along;
+    constexpr std::uint32_t golden = 2654435769U;  // of 2^32: points beside each other are in different parts
+    return static_cast<int>((point * golden) >> 28U) < whole ? 1 : along;
+}
+
+bool Division::servesFor(const Division& other) const noexcept
+{
+    const auto isOne = [](const Division& d) { return d.along == 1 || d.whole == parts; };
+    return (isOne(*this) && isOne(other)) || (along == other.along && std::abs(whole - other.whole) <= 1);
 }
 
 Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
@@ -100,16 +106,14 @@ Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexc
     if (tool.pushed == Vec3(0.0)) {
         return {};
     }
-    const double patch = radiusOfPatch(tool) / spacing, whole = wrapping(tool);
+    const double patch = radiusOfPatch(tool) / spacing;
     const Vec3 axis = tool.shape.b - tool.shape.a;
     const bool lies = glm::length(axis) > radiusOfPatch(tool) &&
                       std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
     const auto* const found = std::find_if(closeness.begin() + (lies ? 1 : 0), closeness.end(),
                                            [&](const Closeness& c) { return patch < c.radius; });
-    if (found == closeness.end() || whole >= 1.0) {
-        return {};
-    }
-    return {static_cast<int>(std::ceil(edge / (found->apart * spacing))), static_cast<unsigned>(8.0 * whole)};
+    const int along = found == closeness.end() ? 1 : static_cast<int>(std::ceil(edge / (found->apart * spacing)));
+    return {along, static_cast<int>(Division::parts * wrapping(tool))};
 }
 
 namespace {

@@ -174,14 +174,19 @@ bool isOnEnd(const occupancy::RoundCone& shape, Vec3 normal) noexcept;
 double wrapping(const ElasticTool& tool) noexcept;
 /// Into how many pieces along each of two edges surface points are divided while a tool's patch is small: points of a small
 /// patch are then as dense as this, wherever in the cells the surface lies. Where it lies around a tool, points as dense as
-/// the tool's cells make them too stiff: they become whole, an eighth of them after the other. All at once changed the
+/// the tool's cells make them too stiff: they become whole, one part after the other. All at once changed the
 /// force by up to 5 %.
 struct Division {
+    static constexpr int parts = 16;
+
     int along = 1;
-    unsigned wholeEighths = 0;  // of the points, which are one piece
+    int whole = 0;  // parts of the points, which are one piece
 
     bool operator==(const Division&) const = default;
+    /// Into how many pieces along each edge a point of the surface is divided.
     int of(std::uint32_t point) const noexcept;
+    /// Whether points divided so still serve: a hand that trembles does not have them looked for in each tick.
+    bool servesFor(const Division& other) const noexcept;
 };
 /// @param spacing  of the finest cells [m]
 /// @param edge     ElasticBody::pieceEdge

@@ -64,6 +64,25 @@ TEST(SmallBalls, FeelTheSameOverNodesAndBetweenThem)
     }
 }
 
+// Neighbours are in different parts. Sites are looked for anew when two parts have changed: a hand that trembles stays with
+// those that it has.
+TEST(SmallBalls, PointsBecomeWholePartByPart)
+{
+    const Division none{2, 0}, all{2, Division::parts};
+    for (int whole = 0; whole <= Division::parts; ++whole) {
+        const Division some{2, whole};
+        int ones = 0;
+        for (std::uint32_t point = 0; point < 800; ++point) {
+            ones += some.of(point) == 1 ? 1 : 0;
+        }
+        EXPECT_NEAR(ones, 50 * whole, 8);
+        EXPECT_EQ(some.servesFor(none), whole <= 1);
+        EXPECT_EQ(some.servesFor(all), whole >= Division::parts - 1);
+        EXPECT_EQ(some.servesFor({1, 0}), whole == Division::parts) << "a patch that needs no pieces";
+        EXPECT_EQ(some.servesFor({4, whole}), whole == Division::parts) << "smaller pieces";
+    }
+}
+
 // Points become whole around half a radius. All at once, the force fell by 4 to 5 % there.
 TEST(SmallBalls, ForceHasNoStepWherePointsBecomeWhole)
 {
