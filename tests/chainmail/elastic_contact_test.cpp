@@ -161,7 +161,7 @@ TEST(ElasticContact, AShortCapsuleTouchesAsABall)
         EXPECT_NEAR(found.sum, ball.sum, within) << glm::length(axis);
         EXPECT_NEAR(found.square, ball.square, within) << glm::length(axis);
         EXPECT_NEAR(found.product, ball.product, within) << glm::length(axis);
-        EXPECT_TRUE(piecesUnder(capsule, grid.spacing, 1e-3) == pieces) << glm::length(axis);
+        EXPECT_EQ(piecesUnder(capsule, grid.spacing, 1e-3), pieces) << glm::length(axis);
     };
     for (const double length : {1e-6, 0.01e-3, 0.1e-3}) {
         for (const Vec3 axis : {Vec3(0, 1, 0), Vec3(1, 0, 0), Vec3(0.6, 0.8, 0)}) {

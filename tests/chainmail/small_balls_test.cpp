@@ -40,7 +40,7 @@ std::vector<double> forcesOf(const ElasticBody& body, double radius, Vec3 place,
 }
 
 // Over a node, between nodes, and on the way from one to the other. With what cells lack taken under a patch as wide as a
-// larger ball's, places differed by up to 10 % on 40 mm of fat, and by 15 % on 12 mm.
+// larger ball's, places differed by up to 13 %.
 TEST(SmallBalls, FeelTheSameOverNodesAndBetweenThem)
 {
     const std::array<Vec3, 5> places{Vec3(0), Vec3(0.25, 0, 0.25), Vec3(0.5, 0, 0), Vec3(0.5, 0, 0.25), Vec3(0.5, 0, 0.5)};
@@ -83,7 +83,8 @@ TEST(SmallBalls, PointsBecomeWholePartByPart)
     }
 }
 
-// Points become whole around half a radius. All at once, the force fell by 4 to 5 % there.
+// Points become whole around half a radius. All at once, the force changed by up to 6 % there, by what is narrower until
+// then.
 TEST(SmallBalls, ForceHasNoStepWherePointsBecomeWhole)
 {
     for (const int thickness : {6, 20}) {
