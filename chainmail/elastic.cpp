@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -190,7 +191,7 @@ void Elastic::remember(int periods) noexcept
     historyEnergy_ += fraction * work[0];
     if (products_) {
         (*products_)[0] -= fraction * work[0];
-        (*products_)[1] -= fraction * work[1];
+        (*products_)[1] -= fraction * increment_ * work[1];
     }
 }
 
@@ -236,11 +237,17 @@ void Elastic::refreshForces() noexcept
 }
 
 // r = forces of the tissue and of the contacts, whose sizes it adds up. Returns its norm.
-double Elastic::refreshResidual(bool isCopied) noexcept
+double Elastic::refreshResidual() noexcept
 {
-    if (!isCopied) {
+    if (!std::exchange(course_.isCopied, false)) {
         stack_.copy(Field::a, Field::r);
     }
+    addContactForces();
+    return std::sqrt(stack_.dot(Field::r, Field::r));
+}
+
+void Elastic::addContactForces() noexcept
+{
     contactForce_ = 0.0;
     const auto forceOf = [&](const ContactSite& s) {
         contactForce_ += glm::length(s.force);
@@ -249,7 +256,6 @@ double Elastic::refreshResidual(bool isCopied) noexcept
     addByCell(sites(), forceOf, [&](const ContactSite& s, int corner, Vec3 force) {
         stack_.addForce(s.level, stack_[s.level].layout.corner(s.node, corner), force);
     });
-    return std::sqrt(stack_.dot(Field::r, Field::r));
 }
 
 void Elastic::prepareContacts() noexcept
@@ -329,7 +335,11 @@ void Elastic::findLag() noexcept
         return;
     }
     if (!course_.isKnown) {
-        refreshResidual(std::exchange(course_.hasGone, false));
+        // Of the finest window alone, which alongSlopes() looks at.
+        course_.isCopied = false;
+        Window& w = stack_[0];
+        std::memcpy(w.field(Field::r), w.field(Field::a), 3 * w.layout.count * sizeof(float));
+        addContactForces();
     }
     const Vec3 all = stack_.alongSlopes(Field::r, Field::u);
     only->lag = all - glm::dot(all, only->inward) * only->inward;

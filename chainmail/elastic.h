@@ -150,8 +150,10 @@ private:
     struct LastStep {
         Field direction = Field::d;
         Field image = Field::e;
-        Parabola tissue;    // along all of it, where it led
-        double length = 0;  // of it, in the sites' p
+        Parabola tissue;     // along all of it, where it led
+        double length = 0;   // of it, in the sites' p
+        double stored = 1;   // of it, in the field `direction`
+        double ofImage = 1;  // of its image, in the field `image`
     };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
@@ -177,14 +179,14 @@ private:
     // How far the solution of a load has got.
     struct Course {
         Effort effort{};
-        int usual = 0;         // cycles that it may have, but for one more where it is far off
-        int last = 0;          // and with that one
-        int next = 0;          // the cycle that comes next
-        double start = 0;      // energy when the call began, tissue and contacts [J]
-        bool isOpen = false;   // the tissue's force was not evaluated where it is
-        bool hasGone = false;  // r is a, or the residual
-        bool isKnown = false;  // r is the residual: it ended balanced
-        bool isHalf = false;   // z is its correction, and the step along it is left
+        int usual = 0;          // cycles that it may have, but for one more where it is far off
+        int last = 0;           // and with that one
+        int next = 0;           // the cycle that comes next
+        double start = 0;       // energy when the call began, tissue and contacts [J]
+        bool isOpen = false;    // the tissue's force was not evaluated where it is
+        bool isCopied = false;  // r is a
+        bool isKnown = false;   // r is the residual: it ended balanced
+        bool isHalf = false;    // z is its correction, and the step along it is left
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     void relieve(std::span<const ElasticTool> tools) noexcept;
@@ -207,7 +209,9 @@ private:
     bool springsBack() const noexcept;
     void remember(int periods) noexcept;
     void takeGiven() noexcept;
-    double refreshResidual(bool isCopied) noexcept;
+    double refreshResidual() noexcept;
+    void addContactForces() noexcept;
+    void scaleIncrement() noexcept;
     void prepareContacts() noexcept;
     Along look() noexcept;
     double lineSearch(double slope, double curvature, Along start, int steps) const noexcept;
@@ -289,6 +293,7 @@ private:
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
+    double increment_ = 1;                           // of the last call, in the fields d and e
     double stiffness_ = 0;                           // along the last step, of tissue and contacts
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()

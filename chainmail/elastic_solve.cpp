@@ -66,8 +66,8 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     result.start = course_.start;
     startEnergy_ = energy_;
     if (hasIncrement_) {
-        course_.hasGone = warmStart(result);
-        course_.isOpen = course_.hasGone && !volume::isSmall(options_.law);
+        course_.isCopied = warmStart(result);
+        course_.isOpen = course_.isCopied && !volume::isSmall(options_.law);
     } else {
         forgetIncrement();
     }
@@ -75,7 +75,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     // No hand feels tissue that springs back.
     course_.usual = isTouched ? effort.cycles : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
-    if (!effort.inParts || !course_.hasGone) {
+    if (!effort.inParts || !course_.isCopied) {
         solve(effort.inParts ? 1 : course_.last, result);
     }
     finish(result);
@@ -98,7 +98,7 @@ ElasticResult Elastic::goOn(bool isLast) noexcept
     result.start = energy_ + contactEnergy_;
     result.cycles = static_cast<std::uint32_t>(c.next);
     if (!c.isHalf) {
-        result.residual = refreshResidual(std::exchange(c.hasGone, false));
+        result.residual = refreshResidual();
         if (isBalanced(result.residual, toleranceOf(result))) {
             endBalanced();
         } else if (!isLast || c.next == 0) {
@@ -144,10 +144,10 @@ void Elastic::endBalanced() noexcept
 void Elastic::endCycle(ElasticResult& result) noexcept
 {
     Course& c = course_;
-    c.hasGone = step(c.isOpen ? c.start : noLimit, result);
-    if (!c.hasGone && c.isOpen && !confirm(c.start)) {
+    const bool hasGone = step(c.isOpen ? c.start : noLimit, result);
+    if (!hasGone && c.isOpen && !confirm(c.start)) {
         again(result);
-    } else if (!c.hasGone) {
+    } else if (!hasGone) {
         refreshForces();
         forgetStep();
     }
@@ -159,7 +159,6 @@ void Elastic::close(ElasticResult& result) noexcept
 {
     if (std::exchange(course_.isOpen, false) && !confirm(course_.start)) {
         again(result);
-        course_.hasGone = false;
     }
 }
 
@@ -168,14 +167,14 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 {
     Course& c = course_;
     for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        result.residual = refreshResidual(c.hasGone);
+        result.residual = refreshResidual();
         if (isBalanced(result.residual, toleranceOf(result))) {
             if (!c.isOpen || c.effort.isTick) {
                 endBalanced();
                 break;
             }
             // The force was carried along; it may be another where the tissue is now.
-            c.isOpen = c.hasGone = false;
+            c.isOpen = false;
             if (confirm(c.start)) {
                 refreshForces();
             } else {

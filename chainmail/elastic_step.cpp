@@ -35,14 +35,14 @@ Along Elastic::look() noexcept
     ValueAt increment(stack_.windows(), Field::d);
     Along contacts;
     for (ContactSite& s : active()) {
-        s.p = increment(s);
+        s.p = increment_ * increment(s);
         contacts.add(s, 0.0);
     }
     if (!products_) {
         const auto product = stack_.dots(Field::d, Field::a, Field::e);
-        products_ = {stack_.dot(Field::u, Field::a), product[0], product[1]};
+        products_ = {stack_.dot(Field::u, Field::a), increment_ * product[0], increment_ * increment_ * product[1]};
     }
-    last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}};
+    last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}, 0.0, increment_, increment_};
     return contacts;
 }
 
@@ -96,10 +96,12 @@ bool Elastic::warmStart(ElasticResult& result) noexcept
         forgetIncrement();
         return false;
     }
-    stack_.warmStart(length);
+    increment_ *= length;
+    stack_.warmStart(increment_);
     products_.reset();
     last_.tissue = last_.tissue.from(length);
     last_.length = length;
+    last_.stored = last_.ofImage = increment_;
     return true;
 }
 
@@ -111,7 +113,8 @@ bool Elastic::confirm(double start) noexcept
         retreat();
         return false;
     }
-    products_ = stack_.keepStep(Field::d, {.length = 0.0F});
+    products_ = stack_.keepStep(Field::d, {.length = 0.0F, .keep = static_cast<float>(increment_)});
+    increment_ = last_.stored = last_.ofImage = 1.0;
     return true;
 }
 
@@ -119,8 +122,8 @@ bool Elastic::confirm(double start) noexcept
 void Elastic::retreat() noexcept
 {
     products_.reset();
-    stack_.combine(Field::u, -1.0, Field::d, Field::u);
-    stack_.combine(Field::a, -1.0, Field::e, Field::a);
+    stack_.combine(Field::u, -increment_, Field::d, Field::u);
+    stack_.combine(Field::a, -increment_, Field::e, Field::a);
     energy_ = startEnergy_;
     ValueAt displacement(stack_.windows(), Field::u);
     touchAll([&](ContactSite& s) {
@@ -135,7 +138,7 @@ void Elastic::retreat() noexcept
 bool Elastic::takeLinearStep(Direction to, ElasticResult& result) noexcept
 {
     if (to.field == Field::p) {
-        stack_.direct(last_.direction, to.beta, 0.0);
+        stack_.direct(last_.direction, last_.stored * to.beta, 0.0);
     }
     to.tissue.curvature = -stack_.evaluate(to.field, Field::f, to.field, volume::SmallStrain{}).product;
     const double length = searchParabola(to, result);
@@ -164,7 +167,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
     double gone = 0.0;
     for (int i = 0, searches = 0; length != 0.0;) {
         if (gone == 0.0 && to.field == Field::p) {
-            stack_.direct(last_.direction, to.beta, length);
+            stack_.direct(last_.direction, last_.stored * to.beta, length);
         } else {
             stack_.combine(Field::u, length - gone, to.field, Field::u);
         }
@@ -205,10 +208,11 @@ void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
 {
     const bool again = to.field == Field::d;
     const double length = static_cast<double>(step.length);
-    step.keep = again ? 0.0F : 1.0F;
+    step.keep = again ? 0.0F : static_cast<float>(increment_);
     products_ = stack_.keepStep(to.field, step);
+    increment_ = 1.0;
     stiffness_ = to.tissue.curvature + to.contacts.curvature;
-    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length), length};
+    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length), length, again ? 1.0 : length, 1.0};
 }
 
 // One step of preconditioned conjugate gradients, conjugate to the last: along the correction z of the forces out of
@@ -218,7 +222,7 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
     double& nearness = nearness_[std::min<std::size_t>(result.cycles, nearness_.size()) - 1];
     const auto product = stack_.dots(Field::z, Field::a, last_.image);
     double own = last_.tissue.curvature;
-    double mixed = -product[1];
+    double mixed = -last_.ofImage * product[1];
     double work = product[0];  // of the residual along z
     ValueAt correction(stack_.windows(), Field::z);
     for (ContactSite& s : active()) {
@@ -251,15 +255,25 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
 // Steps along the last call's increment. With the tissue's force evaluated it is sure not to go up.
 void Elastic::again(ElasticResult& result) noexcept
 {
+    scaleIncrement();
     const Along contacts = look();
     if (!takeStep({Field::d, 0.0, last_.tissue, contacts}, noLimit, result)) {
         forgetIncrement();
     }
 }
 
+// Fields d and e become the increment itself.
+void Elastic::scaleIncrement() noexcept
+{
+    stack_.combine(Field::d, increment_ - 1.0, Field::d, Field::d);
+    stack_.combine(Field::e, increment_ - 1.0, Field::e, Field::e);
+    increment_ = 1.0;
+}
+
 void Elastic::forgetIncrement() noexcept
 {
     products_.reset();
+    increment_ = 1.0;
     stack_.clear(Field::d);
     stack_.clear(Field::e);
     forgetStep();

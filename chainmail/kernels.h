@@ -30,8 +30,8 @@ struct Layout {
     std::size_t corner(std::size_t node, int c) const noexcept { return node + at(c & 1, (c >> 1) & 1, c >> 2); }
     /// Floats that a field of three components takes.
     std::size_t fieldSize() const noexcept { return 3 * count + lanes; }
-    /// Floats of working memory that apply() needs.
-    std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
+    /// Floats of working memory that apply() and restrictAdd() need.
+    std::size_t scratchSize() const noexcept { return 6 * plane + 3 * lanes * static_cast<std::size_t>(ny) + lanes; }
 };
 
 /// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none; its
@@ -51,8 +51,9 @@ struct CutCells {
     std::array<const float*, 3> spread{};
 };
 
-/// What is in Layout::lanes cells in a row: whole cells, of which some may be empty; at least one that is cut; no tissue.
-enum class Filling : std::uint8_t { whole, cut, empty };
+/// What is in Layout::lanes cells in a row: whole cells, of which some may be empty; at least one that is cut; no tissue;
+/// whole cells of which none stiffens.
+enum class Filling : std::uint8_t { whole, cut, empty, constant };
 
 /// Stiffness of each cell (count x 1), both moduli scaled by spacing / 32, zero where there is no tissue; and the law that
 /// they belong to.
@@ -62,7 +63,7 @@ struct CellStiffness {
     const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
     CellLayers layers{};                // without mu: no cell has one
     CutCells cuts{};
-    const Filling* filling = nullptr;  // (count / lanes x 1); none: whole cells
+    const Filling* filling = nullptr;  // (count / lanes x 1); none: whole cells, constant without `stiffening`
     /// How much less bending modes count in cells that are stretched, 0 to 1, by up to a third; see Kernels::applyFinite().
     float relief = 0;
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
@@ -153,12 +154,12 @@ struct Kernels {
     double (*alongSlope)(const float* tissue, const float* r, const float* u, std::size_t step, std::size_t n) noexcept;
     /// out = x + a y; out may be x or y
     void (*combine)(const float* x, float a, const float* y, float* out, std::size_t n) noexcept;
-    /// d *= step,  e *= step,  u += d,  a += e,  r = a
+    /// u += step d,  a += step e,  r = a
     void (*warmStart)(float step, const StepFields& to, std::size_t n) noexcept;
     /// p = z + beta last,  u += step p; last may be p
     void (*direct)(const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept;
-    /// q = share (f - base a),  a += q,  e = keep e + q,  u += further p,  p *= length,  d = keep d + p,  r = a; p may be d
-    /// where length or keep is 0. sums: a . u, a . d, e . d
+    /// q = fraction (f - base a),  a += q,  e = keep e + q,  u += further p,  d = keep d + length p; p may be d. sums: a .
+    /// u, a . d, e . d
     void (*keepStep)(const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept;
     /// y = -mask y, for each of three components; @returns x . y
     double (*negate)(const float* mask, const float* x, float* y, std::size_t count) noexcept;

@@ -2,6 +2,8 @@
 
 #include <chainmail/kernels.h>
 
+#include <type_traits>
+
 namespace palpate::chainmail {
 
 namespace {
@@ -9,12 +11,14 @@ namespace {
 // Small strain: the law of kernels.h.
 template <typename Layer>
 struct Linear {
+    static constexpr bool stiffens = false;
+
     Layer layers;
     Cuts cuts;
 
     template <typename Filled>
-    void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
-                    Modes (&g)[3]) noexcept
+    [[gnu::always_inline]] void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell,
+                                           const Modes (&m)[3], Modes (&g)[3]) noexcept
     {
         const Lanes two = 2.0F * mu;
         const Lanes four = 4.0F * mu;
@@ -35,18 +39,19 @@ struct Linear {
 // times the scaled stiffness.
 template <typename Law, typename Layer, typename Bending>
 struct Finite {
+    static constexpr bool stiffens = true;
+
     float inverse;            // 1 / h
     const float* stiffening;  // of each cell, or none
     Layer layers;
     Cuts cuts;
     Bending bending;
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
-    std::size_t turn = 0;
 
     // With G = F - I:  J - 1 = tr G + (tr^2 - G : G^T) / 2 + det G, so that no small difference of large numbers is taken.
     template <typename Filled>
-    void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
-                    Modes (&g)[3]) noexcept
+    [[gnu::always_inline]] void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell,
+                                           const Modes (&m)[3], Modes (&g)[3]) noexcept
     {
         const float q = 0.25F * inverse;
         const float h8 = 8.0F / inverse;
@@ -67,24 +72,34 @@ struct Finite {
         const Lanes determinant = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2];
         const Lanes volume = trace + minors + determinant;
         const Lanes pressure = (lambda + mu) * volume;
-        Lanes square{};
+        Lanes column[3];
 #pragma GCC unroll 3
-        for (int i = 0; i < 3; ++i) {
-            square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
+        for (int j = 0; j < 3; ++j) {
+            column[j] = f[0][j] * f[0][j] + f[1][j] * f[1][j] + f[2][j] * f[2][j];
         }
-        const volume::Invariant<Lanes> stretch = volume::isochoric(square - 2.0F * (minors + determinant), volume);
-        const volume::Stiffening<Lanes> beyond =
-            Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, stretch.i);
-        const Lanes shear = mu + beyond.slope * stretch.byShape;
-        const Lanes pushed = pressure + 0.5F * beyond.slope * stretch.byVolume;
+        const Lanes square = column[0] + column[1] + column[2];
+        Lanes shear = mu, pushed = pressure;
+        Lanes density = mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume;
+        if constexpr (!std::is_same_v<Filled, Constant>) {
+            const volume::Invariant<Lanes> stretch = volume::isochoric(square - 2.0F * (minors + determinant), volume);
+            const volume::Stiffening<Lanes> beyond =
+                Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, stretch.i);
+            shear += beyond.slope * stretch.byShape;
+            pushed += 0.5F * beyond.slope * stretch.byVolume;
+            density += beyond.energy;
+        }
+        // shear (G - C) + pushed (I + C), C = tr G I - G^T + cof G the cofactor of F, less I. What a turn has in G and C
+        // alike cancels before it is multiplied.
+        const Lanes byShear = h8 * shear, byPushed = h8 * pushed;
+        const Lanes onDiagonal = byPushed + (byPushed - byShear) * trace;
         Lanes p[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
 #pragma GCC unroll 3
             for (int j = 0; j < 3; ++j) {
-                // Cofactor of F, less I: tr G I - G^T + cof G.
-                const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
-                p[i][j] = h8 * (shear * (f[i][j] - cofactor) + pushed * (i == j ? cofactor + 1.0F : cofactor));
+                const Lanes strain = f[i][j] + f[j][i];
+                const Lanes one = byShear * (strain - c[i][j]) + byPushed * (c[i][j] - f[j][i]);
+                p[i][j] = i == j ? one + onDiagonal : one;
             }
         }
         g[0].x = p[0][0];
@@ -96,14 +111,13 @@ struct Finite {
         g[2].x = p[2][0];
         g[2].y = p[2][1];
         g[2].z = p[2][2];
-        const Lanes bend = hourglassTurned(filled, mu, lambda, q, bending, f, m, g);
-        const Lanes layer = layers.finite(cell, lambda / (lambda + 2.0F * mu + tiny), q, h8, m, g);
+        const Lanes bend = hourglassTurned(filled, mu, lambda, q, bending, f, column, m, g);
+        if constexpr (Layer::some) {
+            density += layers.finite(cell, lambda / (lambda + 2.0F * mu + tiny), q, h8, m, g);
+        }
         // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
-        energy[turn] +=
-            h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + beyond.energy + layer) +
-            0.5F * bend;
-        turn = (turn + 1) % (Layout::lanes / W);
+        energy[cell / W % (Layout::lanes / W)] += h2 * density + 0.5F * bend;
     }
 };
 
@@ -112,14 +126,16 @@ template <typename Law>
 [[gnu::always_inline]] inline void energyOf(Law& law, Filling filling, Lanes mu, Lanes lambda, std::size_t cell,
                                             const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
-    if (filling == Filling::whole) [[likely]] {
+    if (filling == Filling::cut) [[unlikely]] {
+        Modes within[3] = {m[0], m[1], m[2]};
+        law.cuts.toMiddle(cell, within);
+        law(law.cuts.spread(cell), mu, lambda, cell, within, g);
+        law.cuts.fromMiddle(cell, g);
+    } else if (Law::stiffens && filling == Filling::whole) {
         law(Whole{}, mu, lambda, cell, m, g);
-        return;
+    } else {
+        law(Constant{}, mu, lambda, cell, m, g);
     }
-    Modes within[3] = {m[0], m[1], m[2]};
-    law.cuts.toMiddle(cell, within);
-    law(law.cuts.spread(cell), mu, lambda, cell, within, g);
-    law.cuts.fromMiddle(cell, g);
 }
 
 // What becomes of A u at a node: it is stored,
@@ -143,7 +159,8 @@ struct KeepResidual {
     }
 };
 
-// or it is stored and smooths u, u += weight * diagonal (r - A u). The sweep has read a plane of u before it gets here.
+// or it is stored and smooths u, u += weight * diagonal (r - A u). The sweep has read a node for the last time before it
+// gets here.
 struct KeepSmooth {
     float weight;
     const float* diagonal;
@@ -160,148 +177,137 @@ struct KeepSmooth {
     }
 };
 
-// One row of cells gives to two rows of nodes: `first` is its lower row, complete with what the row before left in `carry`.
-// Along x a node takes from the cell on its right and from the one on its left.
-template <typename Keeper>
-class RowSum {
-public:
-    RowSum(float* carry, const Keeper& keep, std::size_t component, std::size_t at)
-        : carry_(carry), keep_(keep), component_(component), at_(at)
-    {
-    }
-
-    void add(std::size_t i, const Plane& v) noexcept
-    {
-        const Lanes s = v.ss - v.sd + load(carry_ + 2 * i);
-        const Lanes d = v.ds - v.dd + load(carry_ + 2 * i + W);
-        store(carry_ + 2 * i, v.ss + v.sd);
-        store(carry_ + 2 * i + W, v.ds + v.dd);
-        emit(i, s, d);
-    }
-
-    // The last row of nodes has no cells of its own.
-    void finish(std::size_t i) noexcept { emit(i, load(carry_ + 2 * i), load(carry_ + 2 * i + W)); }
-
-private:
-    void emit(std::size_t i, Lanes s, Lanes d) noexcept
-    {
-        const Lanes right = s + d;
-        keep_(component_, at_ + i, s - d + shifted(before_, right));
-        before_ = right;
-    }
-
-    float* carry_;
-    const Keeper& keep_;
-    std::size_t component_;
-    std::size_t at_;
-    Lanes before_{};
-};
-
-// Gives what was gathered for one plane of nodes to its rows.
-template <typename Keeper>
+// Goes through the cells of one layer after the other, W of a row at a time along x and there from row to row along y. What
+// two cells share that follow each other is kept in registers. Along z a layer gives to two planes of nodes: the lower one
+// is complete with what the layer below has left in `carry`. Along x a node takes from the cell on its right and from the
+// one on its left.
+// @tparam Wide  rows have more than W nodes
+template <typename Keeper, bool Wide>
 struct Sweep {
     const Layout& layout;
     const float* u;
     const Keeper& keep;
-    float* planes;   // sums and differences of the plane below (12 x plane)
-    float* pending;  // what the layer below gave to the plane (12 x plane)
-    float* carry;    // what the row before gave to this row (6 x row)
-
-    Plane planeAt(int c, std::size_t at) const noexcept
-    {
-        return planeOf(u + static_cast<std::size_t>(c) * layout.count + at, layout.row);
-    }
-    float* component(float* p, int c) const noexcept { return p + static_cast<std::size_t>(c) * 4 * layout.plane; }
-    float* carryOf(int c) const noexcept { return carry + static_cast<std::size_t>(c) * 2 * layout.row; }
-
-    void begin() noexcept
-    {
-        std::memset(pending, 0, 12 * layout.plane * sizeof(float));
-#pragma GCC unroll 3
-        for (int c = 0; c < 3; ++c) {
-            for (std::size_t at = 0; at + layout.row < layout.plane; at += W) {
-                storePlane(component(planes, c) + at, layout.plane, planeAt(c, at));
-            }
-        }
-    }
-
-    void lastRow(std::size_t at) noexcept
-    {
-#pragma GCC unroll 3
-        for (int c = 0; c < 3; ++c) {
-            RowSum<Keeper> sum(carryOf(c), keep, static_cast<std::size_t>(c), at);
-            for (std::size_t i = 0; i < layout.row; i += W) {
-                sum.finish(i);
-            }
-        }
-    }
+    float* carry;   // sums and differences along x of what a layer gives to the next (6 x plane)
+    float* before;  // what cells on the left give (3 x W x rows)
 
     static Filling fillingAt(const CellStiffness& stiffness, std::size_t cell) noexcept
     {
-        return stiffness.filling != nullptr ? stiffness.filling[cell / Layout::lanes] : Filling::whole;
+        if (stiffness.filling != nullptr) {
+            return stiffness.filling[cell / Layout::lanes];
+        }
+        return stiffness.stiffening != nullptr ? Filling::whole : Filling::constant;
     }
 
-    // What cells without tissue do: the plane above them becomes the one below, and nodes get what others gave.
-    void passOn(std::size_t above, std::size_t inPlane, std::size_t i, RowSum<Keeper> (&sum)[3]) noexcept
+    // Of W nodes in row j, from i on.
+    float* carryOf(int j, std::size_t i) const noexcept
+    {
+        return carry + 6 * (static_cast<std::size_t>(j) * layout.row + i);
+    }
+
+    void clearBefore() const noexcept
+    {
+        if constexpr (Wide) {
+            std::memset(before, 0, 3 * W * static_cast<std::size_t>(layout.ny) * sizeof(float));
+        }
+    }
+
+    // One component of W nodes, complete: the cells on their right gave the sums s and differences d along x.
+    void emit(int j, int c, std::size_t at, Lanes s, Lanes d) const noexcept
+    {
+        const Lanes right = s + d;
+        Lanes left{};
+        if constexpr (Wide) {
+            float* const waits = before + (3 * j + c) * W;
+            left = load(waits);
+            store(waits, right);
+        }
+        keep(static_cast<std::size_t>(c), at, s - d + shifted(left, right));
+    }
+
+    // What the cells of two rows give to the row of nodes between them.
+    void give(int j, std::size_t i, std::size_t at, const Plane (&v)[3]) const noexcept
     {
 #pragma GCC unroll 3
         for (int c = 0; c < 3; ++c) {
-            storePlane(component(planes, c) + inPlane, layout.plane, planeAt(c, above));
-            float* wait = component(pending, c) + inPlane;
-            sum[c].add(i, loadPlane(wait, layout.plane));
-            storePlane(wait, layout.plane, Plane{});
+            float* const sum = carryOf(j, i) + 2 * c * W;
+            float* const difference = sum + W;
+            const Lanes s = v[c].ss - v[c].sd + load(sum);
+            const Lanes d = v[c].ds - v[c].dd + load(difference);
+            store(sum, v[c].ss + v[c].sd);
+            store(difference, v[c].ds + v[c].dd);
+            emit(j, c, at, s, d);
         }
     }
 
     template <typename Law>
-    void layer(int k, CellStiffness stiffness, Law& law) noexcept
+    void strip(int k, std::size_t i, CellStiffness stiffness, Law& law) const noexcept
     {
-        const std::size_t above = layout.at(0, 0, k + 1);
-        std::memset(carry, 0, 6 * layout.row * sizeof(float));
-        for (int j = 0; j + 1 < layout.ny; ++j) {
-            const std::size_t at = layout.at(0, j, k);
-            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
-            RowSum<Keeper> sum[3] = {{carryOf(0), keep, 0, at}, {carryOf(1), keep, 1, at}, {carryOf(2), keep, 2, at}};
-            for (std::size_t i = 0; i < layout.row; i += W) {
-                const Filling filling = fillingAt(stiffness, at + i);
-                if (filling == Filling::empty) {
-                    passOn(above + inPlane + i, inPlane + i, i, sum);
-                    continue;
-                }
-                Modes m[3];
-                Modes g[3];
+        std::size_t at = layout.at(0, 0, k) + i;
+        const auto planeAt = [&](int c, std::size_t node) {
+            return planeOf(u + static_cast<std::size_t>(c) * layout.count + node, layout.plane);
+        };
+        Plane low[3];
+        Plane waits[3] = {};  // what the row of cells before gives
 #pragma GCC unroll 3
-                for (int c = 0; c < 3; ++c) {
-                    const Plane high = planeAt(c, above + inPlane + i);
-                    m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
-                    storePlane(component(planes, c) + inPlane + i, layout.plane, high);
-                }
-                energyOf(law, filling, load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
-#pragma GCC unroll 3
-                for (int c = 0; c < 3; ++c) {
-                    float* wait = component(pending, c) + inPlane + i;
-                    sum[c].add(i, lower(g[c]) + loadPlane(wait, layout.plane));
-                    storePlane(wait, layout.plane, upper(g[c]));
-                }
-            }
+        for (int c = 0; c < 3; ++c) {
+            low[c] = planeAt(c, at);
         }
-        lastRow(layout.at(0, layout.ny - 1, k));
-    }
-
-    void end() noexcept
-    {
-        std::memset(carry, 0, 6 * layout.row * sizeof(float));
-        for (int j = 0; j + 1 < layout.ny; ++j) {
-            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
+        for (int j = 0; j + 1 < layout.ny; ++j, at += layout.row) {
+            const Filling filling = fillingAt(stiffness, at);
+            if (filling == Filling::empty) {
+                give(j, i, at, waits);
+#pragma GCC unroll 3
+                for (int c = 0; c < 3; ++c) {
+                    low[c] = planeAt(c, at + layout.row);
+                    waits[c] = Plane{};
+                }
+                continue;
+            }
+            Modes m[3];
+            Modes g[3];
 #pragma GCC unroll 3
             for (int c = 0; c < 3; ++c) {
-                RowSum<Keeper> sum(carryOf(c), keep, static_cast<std::size_t>(c), layout.at(0, j, layout.nz - 1));
-                for (std::size_t i = 0; i < layout.row; i += W) {
-                    sum.add(i, loadPlane(component(pending, c) + inPlane + i, layout.plane));
+                const Plane high = planeAt(c, at + layout.row);
+                m[c] = modesOf(low[c], high);
+                low[c] = high;
+            }
+            energyOf(law, filling, load(stiffness.mu + at), load(stiffness.lambda + at), at, m, g);
+            Plane gives[3];
+#pragma GCC unroll 3
+            for (int c = 0; c < 3; ++c) {
+                gives[c] = lower(g[c]) + waits[c];
+                waits[c] = upper(g[c]);
+            }
+            give(j, i, at, gives);
+        }
+        give(layout.ny - 1, i, at, waits);
+    }
+
+    // The last plane of nodes has no cells of its own.
+    void lastPlane() const noexcept
+    {
+        clearBefore();
+        for (std::size_t i = 0; i < layout.row; i += W) {
+            for (int j = 0; j < layout.ny; ++j) {
+                for (int c = 0; c < 3; ++c) {
+                    const float* const sum = carryOf(j, i) + 2 * c * W;
+                    emit(j, c, layout.at(0, j, layout.nz - 1) + i, load(sum), load(sum + W));
                 }
             }
         }
-        lastRow(layout.at(0, layout.ny - 1, layout.nz - 1));
+    }
+
+    template <typename Law>
+    void all(CellStiffness stiffness, Law& law) const noexcept
+    {
+        std::memset(carry, 0, 6 * layout.plane * sizeof(float));
+        for (int k = 0; k + 1 < layout.nz; ++k) {
+            clearBefore();
+            for (std::size_t i = 0; i < layout.row; i += W) {
+                strip(k, i, stiffness, law);
+            }
+        }
+        lastPlane();
     }
 };
 
@@ -309,12 +315,12 @@ template <typename Law, typename Keeper>
 void sweepCells(const Layout& layout, CellStiffness stiffness, const float* u, const Keeper& keep, float* scratch,
                 Law& law) noexcept
 {
-    Sweep<Keeper> sweep{layout, u, keep, scratch, scratch + 12 * layout.plane, scratch + 24 * layout.plane};
-    sweep.begin();
-    for (int k = 0; k + 1 < layout.nz; ++k) {
-        sweep.layer(k, stiffness, law);
+    float* const before = scratch + 6 * layout.plane;
+    if (layout.row == W) {
+        Sweep<Keeper, false>{layout, u, keep, scratch, before}.all(stiffness, law);
+    } else {
+        Sweep<Keeper, true>{layout, u, keep, scratch, before}.all(stiffness, law);
     }
-    sweep.end();
 }
 
 template <typename Keeper>

@@ -13,17 +13,18 @@ struct Modes {
     Lanes x, y, z, xy, yz, zx, xyz;
 };
 
-// The same in one plane of nodes: sums (s) and differences (d) along x, then y.
+// The same in one plane of nodes across y: sums (s) and differences (d) along x, then z.
 struct Plane {
     Lanes ss, ds, sd, dd;
 };
 
-inline Plane planeOf(const float* u, std::size_t row) noexcept
+// @param up  from a node to the one above it along z
+inline Plane planeOf(const float* u, std::size_t up) noexcept
 {
     const Lanes a0 = load(u);
     const Lanes a1 = load(u + 1);
-    const Lanes b0 = load(u + row);
-    const Lanes b1 = load(u + row + 1);
+    const Lanes b0 = load(u + up);
+    const Lanes b1 = load(u + up + 1);
     const Lanes as = a0 + a1;
     const Lanes ad = a1 - a0;
     const Lanes bs = b0 + b1;
@@ -31,34 +32,21 @@ inline Plane planeOf(const float* u, std::size_t row) noexcept
     return {as + bs, ad + bd, bs - as, bd - ad};
 }
 
-inline Plane loadPlane(const float* p, std::size_t plane) noexcept
-{
-    return {load(p), load(p + plane), load(p + 2 * plane), load(p + 3 * plane)};
-}
-
-inline void storePlane(float* p, std::size_t plane, const Plane& v) noexcept
-{
-    store(p, v.ss);
-    store(p + plane, v.ds);
-    store(p + 2 * plane, v.sd);
-    store(p + 3 * plane, v.dd);
-}
-
 inline Modes modesOf(const Plane& low, const Plane& high) noexcept
 {
-    return {low.ds + high.ds, low.sd + high.sd, high.ss - low.ss, low.dd + high.dd,
-            high.sd - low.sd, high.ds - low.ds, high.dd - low.dd};
+    return {low.ds + high.ds, high.ss - low.ss, low.sd + high.sd, high.ds - low.ds,
+            high.sd - low.sd, low.dd + high.dd, high.dd - low.dd};
 }
 
 // What the modes' gradient gives to the lower and to the upper plane of nodes.
 inline Plane lower(const Modes& g) noexcept
 {
-    return {-g.z, g.x - g.zx, g.y - g.yz, g.xy - g.xyz};
+    return {-g.y, g.x - g.xy, g.z - g.yz, g.zx - g.xyz};
 }
 
 inline Plane upper(const Modes& g) noexcept
 {
-    return {g.z, g.x + g.zx, g.y + g.yz, g.xy + g.xyz};
+    return {g.y, g.x + g.xy, g.z + g.yz, g.zx + g.xyz};
 }
 
 inline Plane operator+(const Plane& a, const Plane& b) noexcept
@@ -73,8 +61,10 @@ struct Spread {
     Lanes x, y, z;
 };
 
-// A cell that is full.
+// A cell that is full,
 struct Whole {};
+// and of tissue that does not stiffen.
+struct Constant : Whole {};
 
 // Modes that bend and twist a cell. Bending: with s = lambda / (lambda + 2 mu), the strain across it as free of stress.
 inline void hourglass(Whole, Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
@@ -86,16 +76,16 @@ inline void hourglass(Whole, Lanes mu, Lanes lambda, const Modes (&m)[3], Modes 
     const Lanes alongX = both * (m[1].xy + m[2].zx);
     const Lanes alongY = both * (m[0].xy + m[2].yz);
     const Lanes alongZ = both * (m[0].zx + m[1].yz);
-    const Lanes c = twist * (m[0].yz + m[1].zx + m[2].xy);
+    const Lanes sum = m[0].yz + m[1].zx + m[2].xy;
     g[0].xy = bend * m[0].xy + alongY;
     g[0].zx = bend * m[0].zx + alongZ;
-    g[0].yz = twist * m[0].yz + c;
+    g[0].yz = twist * (m[0].yz + sum);
     g[1].xy = bend * m[1].xy + alongX;
     g[1].yz = bend * m[1].yz + alongZ;
-    g[1].zx = twist * m[1].zx + c;
+    g[1].zx = twist * (m[1].zx + sum);
     g[2].yz = bend * m[2].yz + alongY;
     g[2].zx = bend * m[2].zx + alongX;
-    g[2].xy = twist * m[2].xy + c;
+    g[2].xy = twist * (m[2].xy + sum);
 #pragma GCC unroll 3
     for (int q = 0; q < 3; ++q) {
         g[q].xyz = ninth * m[q].xyz;
@@ -142,25 +132,27 @@ struct Relieved {
 // of the column's length: a third less than 1 at most, where y = q.
 struct RelievedColumns {
     Lanes by[3][3];             // factor F, less I
-    Lanes factor[3], slope[3];  // and its slope by n
+    Lanes factor[3], slope[3];  // and twice its slope by n
 
-    RelievedColumns(const Lanes (&f)[3][3], float relief) noexcept
+    // @param square  of the length of each column of f
+    RelievedColumns(const Lanes (&f)[3][3], const Lanes (&square)[3], float relief) noexcept
     {
         constexpr float q2 = 1.7F * 1.7F;
         const float most = 4.0F / 3.0F * q2 * relief;
 #pragma GCC unroll 3
         for (int j = 0; j < 3; ++j) {
             // n - 1 without the difference of large numbers
-            const Lanes over = 2.0F * f[j][j] + f[0][j] * f[0][j] + f[1][j] * f[1][j] + f[2][j] * f[2][j];
+            const Lanes over = 2.0F * f[j][j] + square[j];
             const Lanes y = over > 0.0F ? over : Lanes{};
             const Lanes part = 1.0F / (q2 + y * y);
             const Lanes t = y * part;
             const Lanes less = most * t * t;
             factor[j] = 1.0F - less;
-            slope[j] = (-2.0F * most) * t * (q2 - y * y) * part * part;
+            slope[j] = (4.0F * most) * t * part * (1.0F - (2.0F * q2) * part);
 #pragma GCC unroll 3
             for (int i = 0; i < 3; ++i) {
-                by[i][j] = i == j ? f[i][j] - less * (1.0F + f[i][j]) : factor[j] * f[i][j];
+                const Lanes one = factor[j] * f[i][j];
+                by[i][j] = i == j ? one - less : one;
             }
         }
     }
@@ -171,10 +163,11 @@ struct RelievedColumns {
 #pragma GCC unroll 3
         for (int j = 0; j < 3; ++j) {
             const Lanes along = g[j][j] + f[0][j] * g[0][j] + f[1][j] * g[1][j] + f[2][j] * g[2][j];
-            const Lanes turned = 2.0F * slope[j] * along;
+            const Lanes turned = slope[j] * along;
 #pragma GCC unroll 3
             for (int i = 0; i < 3; ++i) {
-                g[i][j] = factor[j] * g[i][j] + turned * (i == j ? 1.0F + f[i][j] : f[i][j]);
+                const Lanes one = factor[j] * g[i][j] + turned * f[i][j];
+                g[i][j] = i == j ? one + turned : one;
             }
         }
     }
@@ -196,7 +189,7 @@ template <typename Filled>
         b[j].xyz = m[j].xyz + f[0][j] * m[0].xyz + f[1][j] * m[1].xyz + f[2][j] * m[2].xyz;
     }
     hourglass(filled, mu, lambda, b, w);
-    Lanes twice{};
+    Lanes twice;
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {
         g[i].xy = w[i].xy + f[i][0] * w[0].xy + f[i][1] * w[1].xy + f[i][2] * w[2].xy;
@@ -207,21 +200,23 @@ template <typename Filled>
         for (int j = 0; j < 3; ++j) {
             byF[i][j] = m[i].xy * w[j].xy + m[i].yz * w[j].yz + m[i].zx * w[j].zx + m[i].xyz * w[j].xyz;
         }
-        twice += w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+        const Lanes own = w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+        twice = i == 0 ? own : twice + own;
     }
     return twice;
 }
 
 // The same; adds to g the gradient by the modes of F besides. @param quarter  1 / 4 h: F less I by those modes
+// @param square  of the length of each column of f
 template <typename Filled, typename Bending>
 [[gnu::always_inline]] inline Lanes hourglassTurned(const Filled& filled, Lanes mu, Lanes lambda, float quarter,
-                                                    Bending bending, const Lanes (&f)[3][3], const Modes (&m)[3],
-                                                    Modes (&g)[3]) noexcept
+                                                    Bending bending, const Lanes (&f)[3][3], const Lanes (&square)[3],
+                                                    const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
     Lanes byF[3][3];
     Lanes twice;
     if constexpr (std::is_same_v<Bending, Relieved>) {
-        const RelievedColumns columns(f, bending.relief);
+        const RelievedColumns columns(f, square, bending.relief);
         twice = hourglassBy(filled, mu, lambda, columns.by, m, g, byF);
         columns.pull(f, byF);
     } else {

@@ -84,14 +84,10 @@ void combine(const float* x, float a, const float* y, float* out, std::size_t n)
 void warmStart(float step, const StepFields& to, std::size_t n) noexcept
 {
     for (std::size_t i = 0; i < n; i += W) {
-        const Lanes d = step * load(to.d + i);
-        const Lanes e = step * load(to.e + i);
-        const Lanes a = load(to.a + i) + e;
-        store(to.u + i, load(to.u + i) + d);
+        const Lanes a = load(to.a + i) + step * load(to.e + i);
+        store(to.u + i, load(to.u + i) + step * load(to.d + i));
         store(to.a + i, a);
         store(to.r + i, a);
-        store(to.d + i, d);
-        store(to.e + i, e);
     }
 }
 
@@ -169,16 +165,13 @@ void keepStep(const KeptStep& step, const float* f, const StepFields& to, std::s
         n,
         [&](std::size_t i, int v) {
             const Lanes p = load(to.p + i);
-            const Lanes gone = step.length * p;
             const Lanes change = step.fraction * (load(f + i) - step.base * load(to.a + i));
             const Lanes u = load(to.u + i) + step.further * p;
             const Lanes a = load(to.a + i) + change;
-            const Lanes d = step.keep * load(to.d + i) + gone;
+            const Lanes d = step.keep * load(to.d + i) + step.length * p;
             const Lanes e = step.keep * load(to.e + i) + change;
             store(to.u + i, u);
             store(to.a + i, a);
-            store(to.r + i, a);
-            store(to.p + i, gone);
             store(to.q + i, change);
             store(to.d + i, d);
             store(to.e + i, e);

@@ -115,12 +115,17 @@ Cut CutFields::at(std::size_t cell) const noexcept
     return {{middle_[0][cell], middle_[1][cell], middle_[2][cell]}, {spread_[0][cell], spread_[1][cell], spread_[2][cell]}};
 }
 
-void CutFields::findEmpty(const Floats& mu) noexcept
+void CutFields::classify(const Floats& mu, const Floats& stiffening) noexcept
 {
+    const auto none = [](const Floats& of, std::size_t i) {
+        const auto first = of.begin() + static_cast<std::ptrdiff_t>(i * Layout::lanes);
+        return std::all_of(first, first + Layout::lanes, [](float v) { return v == 0.0F; });
+    };
     for (std::size_t i = 0; i < filling_.size(); ++i) {
-        const auto first = mu.begin() + static_cast<std::ptrdiff_t>(i * Layout::lanes);
-        if (std::all_of(first, first + Layout::lanes, [](float m) { return m == 0.0F; })) {
+        if (none(mu, i)) {
             filling_[i] = Filling::empty;
+        } else if (filling_[i] == Filling::whole && none(stiffening, i)) {
+            filling_[i] = Filling::constant;
         }
     }
 }
@@ -186,7 +191,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
     placeNodes(level);
     placeBorder(coarsest);
     placeFragments(level, coarsest);
-    cuts.findEmpty(mu);
+    cuts.classify(mu, stiffening);
 }
 
 void Window::placeBorder(bool coarsest) noexcept

@@ -87,8 +87,9 @@ public:
     void place(const CellLevel& level, Index3 at) noexcept;
     void set(std::size_t cell, const Cut& cut) noexcept;
     Cut at(std::size_t cell) const noexcept;
-    /// Takes cells without a modulus for empty; until then none is. Those that are set later are not.
-    void findEmpty(const Floats& mu) noexcept;
+    /// Finds where cells have no modulus, and where whole ones do not stiffen; until then none do. Those that are set later
+    /// are cut.
+    void classify(const Floats& mu, const Floats& stiffening) noexcept;
     /// What the kernels take.
     CutCells view() const noexcept;
     const Filling* filling() const noexcept { return filling_.data(); }

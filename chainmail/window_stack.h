@@ -90,11 +90,11 @@ public:
     Vec3 alongSlopes(Field r, Field u) const noexcept;
     /// out = x + a y
     void combine(Field x, double a, Field y, Field out) noexcept;
-    /// d *= step, e *= step, u += d, a += e, r = a.
+    /// u += step d, a += step e, r = a.
     void warmStart(double step) noexcept;
     /// p = z + beta last, u += step p; last may be p.
     void direct(Field last, double beta, double step) noexcept;
-    /// The end of a step along `direction`, p or d, see KeptStep; r = a. Returns { a . u, a . d, e . d }.
+    /// The end of a step along `direction`, p or d, see KeptStep. Returns { a . u, a . d, e . d }.
     std::array<double, 3> keepStep(Field direction, const KeptStep& step) noexcept;
     void copy(Field x, Field y) noexcept;
     void clear(Field field) noexcept;

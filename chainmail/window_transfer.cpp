@@ -179,7 +179,7 @@ const float* markHolding(Window& w) noexcept
         if (w.mu[at] <= 0.0F) {
             return;
         }
-        const bool isWhole = w.cuts.filling()[at / Layout::lanes] == Filling::whole;
+        const bool isWhole = w.cuts.filling()[at / Layout::lanes] != Filling::cut;
         for (int c = 0; c < 8; ++c) {
             const Vec3f share = isWhole ? Vec3f(1.0F) : 1.0F + sideOf(c) * w.cuts.at(at).middle;
             if (share.x * share.y * share.z >= least) {

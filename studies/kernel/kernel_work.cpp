@@ -100,7 +100,7 @@ void countPasses(Kernels& k) noexcept
         counted->combine(x, a, y, out, n);
     };
     k.warmStart = [](float step, const StepFields& to, std::size_t n) noexcept {
-        pass("warmStart", n, 4 + 5);
+        pass("warmStart", n, 4 + 3);
         counted->warmStart(step, to, n);
     };
     k.direct = [](const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept {
@@ -108,7 +108,7 @@ void countPasses(Kernels& k) noexcept
         counted->direct(z, beta, last, step, to, n);
     };
     k.keepStep = [](const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept {
-        pass("keepStep", n, 6 + 7);
+        pass("keepStep", n, 6 + 5);
         counted->keepStep(step, f, to, n, sums);
     };
     k.negate = [](const float* mask, const float* x, float* y, std::size_t count) noexcept {

@@ -308,10 +308,9 @@ TEST(ElasticSets, GoingOnMovesItsFieldsElementByElement)
     for (int looked = 0; looked < 7; ++looked) {
         e.expect([&](const Kernels& k, float* y) { k.warmStart(step, StepOf(e).fields(looked, y), n); },
                  [&](std::size_t i, float y) {
-                     const float d = step * of(2, i, looked, y);
                      const float force = of(1, i, looked, y) + step * of(3, i, looked, y);
                      const std::array<float, 7> now{
-                         of(0, i, looked, y) + d, force, d, step * of(3, i, looked, y), y, y, force};
+                         of(0, i, looked, y) + step * of(2, i, looked, y), force, y, y, y, y, force};
                      return now[static_cast<std::size_t>(looked)];
                  });
     }
@@ -340,15 +339,13 @@ TEST(ElasticSets, AStepIsDirectedAndKeptElementByElement)
             },
             [&](std::size_t i, float y) {
                 const float change = step.fraction * (f[i] - step.base * of(1, i, y));
-                const float gone = step.length * of(4, i, y);
-                const float force = of(1, i, y) + change;
                 const std::array<float, 7> now{of(0, i, y) + step.further * of(4, i, y),
-                                               force,
-                                               step.keep * of(2, i, y) + gone,
+                                               of(1, i, y) + change,
+                                               step.keep * of(2, i, y) + step.length * of(4, i, y),
                                                step.keep * of(3, i, y) + change,
-                                               gone,
+                                               y,
                                                change,
-                                               force};
+                                               y};
                 return now[static_cast<std::size_t>(looked)];
             });
     }

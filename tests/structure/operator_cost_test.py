@@ -24,18 +24,42 @@ def functions(library):
         yield name, body
 
 
-def largest_loop(body):
-    """(additions, multiplications) between a jump back and where it leads, where these are most."""
-    place = {int(m[1], 16): i for i, line in enumerate(body) if (m := re.match(r"\s*([0-9a-f]+):", line))}
-    most = (0, 0)
-    for i, line in enumerate(body):
-        # A jump that is always taken comes back from cells that are cut, which are not counted.
-        jump = re.search(r"\bj(?!mp)\w+\s+([0-9a-f]+)\b", line)
-        target = place.get(int(jump[1], 16), i) if jump else i
-        if target < i:
-            loop = body[target : i + 1]
-            most = max(most, tuple(sum(1 for x in loop if kind.search(x)) for kind in (ADDITION, MULTIPLICATION)))
-    return most
+def cheapest_turn(body):
+    """(additions, multiplications) of the cheapest way around a loop over cells with tissue: that of whole cells whose tissue does
+    not stiffen. Cells without tissue take under a hundred additions."""
+    lines = [m.groups() for line in body if (m := re.match(r"\s*([0-9a-f]+):\s+(\S+)\s*([0-9a-f]*)", line))]
+    place = {int(at, 16): i for i, (at, _, _) in enumerate(lines)}
+    blocks = {}  # first line -> (additions, multiplications, first lines of what may follow)
+    heads = set()
+    leads = {0}
+    for i, (_, name, to) in enumerate(lines):
+        if name[0] == "j":
+            leads.add(i + 1)
+            if to and int(to, 16) in place:
+                leads.add(place[int(to, 16)])
+                if place[int(to, 16)] <= i:
+                    heads.add(place[int(to, 16)])
+    for start in leads - {len(lines)}:
+        end = min((i for i in leads if i > start), default=len(lines))
+        _, name, to = lines[end - 1]
+        follows = [] if name in ("jmp", "ret") else [end]
+        if name[0] == "j" and to and int(to, 16) in place:
+            follows.append(place[int(to, 16)])
+        counts = (sum(1 for _, n, _ in lines[start:end] if kind.search(n)) for kind in (ADDITION, MULTIPLICATION))
+        blocks[start] = (*counts, [f for f in follows if f < len(lines)])
+    turns = []
+
+    def go(head, at, seen, additions, multiplications):
+        more, times, follows = blocks[at]
+        for to in follows:
+            if to == head:
+                turns.append((additions + more, multiplications + times))
+            elif to not in seen:
+                go(head, to, seen | {to}, additions + more, multiplications + times)
+
+    for head in heads:
+        go(head, head, {head}, 0, 0)
+    return min((t for t in turns if t[0] > 100), key=sum, default=(0, 0))
 
 
 def main(library, source):
@@ -44,13 +68,13 @@ def main(library, source):
     seen = {law: 0 for law in expected}
     for name, body in functions(library):
         # Those of windows without thin layers.
-        law = next((law for law in expected if re.search(rf"layer<.*\b{law}\b.*NoLayers", name)), None)
+        law = next((law for law in expected if re.search(rf"strip<.*\b{law}\b.*NoLayers", name)), None)
         # The plain operator: those that end in a pass have that besides, and relieved bending has its factors.
-        plain = "Keep>" in name and "Relieved" not in name
-        if law is None or "layer<" not in name or not plain or not any("zmm" in line for line in body):
+        plain = "Keep, " in name and "Relieved" not in name
+        if law is None or not plain or not any("zmm" in line for line in body):
             continue
         seen[law] += 1
-        counted = largest_loop(body)
+        counted = cheapest_turn(body)
         for what, is_, should in zip(("additions", "multiplications"), counted, expected[law]):
             if abs(is_ - should) > 0.03 * should:
                 sys.exit(f"{law}: {is_} {what} in the compiled loop, {should} in {source}")
