@@ -101,12 +101,12 @@ bool Division::servesFor(const Division& other) const noexcept
     return (isOne(*this) && isOne(other)) || (along == other.along && std::abs(whole - other.whole) <= 1);
 }
 
-Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept
+Division piecesUnder(const ElasticTool& tool, double spacing, double edge, double share) noexcept
 {
     if (tool.pushed == Vec3(0.0)) {
         return {};
     }
-    const double patch = radiusOfPatch(tool) / spacing;
+    const double patch = share * radiusOfPatch(tool) / spacing;
     const Vec3 axis = tool.shape.b - tool.shape.a;
     const bool lies = glm::length(axis) > radiusOfPatch(tool) &&
                       std::abs(glm::dot(axis, tool.pushed)) < steep * glm::length(axis) * glm::length(tool.pushed);
@@ -114,6 +114,14 @@ Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexc
                                            [&](const Closeness& c) { return patch < c.radius; });
     const int along = found == closeness.end() ? 1 : static_cast<int>(std::ceil(edge / (found->apart * spacing)));
     return {along, static_cast<int>(Division::parts * wrapping(tool))};
+}
+
+// A hand that trembles does not have points looked for in each tick.
+bool stillServes(const Division& found, const ElasticTool& tool, double spacing, double edge) noexcept
+{
+    constexpr double beyond = 1.03;  // of a patch: 6 % of a depth
+    return found.servesFor(piecesUnder(tool, spacing, edge, 1.0 / beyond)) ||
+           found.servesFor(piecesUnder(tool, spacing, edge, beyond));
 }
 
 namespace {

@@ -185,12 +185,15 @@ struct Division {
     bool operator==(const Division&) const = default;
     /// Into how many pieces along each edge a point of the surface is divided.
     int of(std::uint32_t point) const noexcept;
-    /// Whether points divided so still serve: a hand that trembles does not have them looked for in each tick.
+    /// Whether points divided so serve as these do, up to one part.
     bool servesFor(const Division& other) const noexcept;
 };
 /// @param spacing  of the finest cells [m]
 /// @param edge     ElasticBody::pieceEdge
-Division piecesUnder(const ElasticTool& tool, double spacing, double edge) noexcept;
+/// @param share    of the tool's patch, that is taken for its radius
+Division piecesUnder(const ElasticTool& tool, double spacing, double edge, double share = 1.0) noexcept;
+/// Whether points found with a division still serve under a tool: until its patch is 3 % beyond where another begins.
+bool stillServes(const Division& found, const ElasticTool& tool, double spacing, double edge) noexcept;
 
 /// How many surface points tools may touch at once whose surface, three cells around them included, is `area` [m^2]: of the
 /// body both sides, as densely as its points lie, and not more than it has. At least `least`.

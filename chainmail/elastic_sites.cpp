@@ -159,7 +159,7 @@ bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
         const auto& now = tools[i].shape;
         const auto& [then, pieces] = foundFor_[i];
         if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
-            now.radiusB != then.radiusB || !pieces.servesFor(piecesUnder(tools[i], spacing, edge))) {
+            now.radiusB != then.radiusB || !stillServes(pieces, tools[i], spacing, edge)) {
             return false;
         }
     }

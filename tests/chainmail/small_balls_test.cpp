@@ -83,6 +83,28 @@ TEST(SmallBalls, PointsBecomeWholePartByPart)
     }
 }
 
+// A hand that trembles where the division changes stays with the points that it has, on either side.
+TEST(SmallBalls, PointsServeUntilThePatchIsWellBeyondWhereOthersBegin)
+{
+    constexpr double radius = 5.0 * cellEdge, edge = 0.5 * cellEdge;
+    const auto pressed = [&](double patch) {  // [cells]
+        ElasticTool tool{.shape = {Vec3(0.0), Vec3(0.0), radius, radius}};
+        tool.pushed = {0.0, -patch * patch * cellEdge * cellEdge / radius, 0.0};
+        return tool;
+    };
+    for (const double bound : {0.75, 1.75}) {
+        const auto found = [&](double share) { return piecesUnder(pressed(share * bound), cellEdge, edge); };
+        const auto serves = [&](const Division& pieces, double share) {
+            return stillServes(pieces, pressed(share * bound), cellEdge, edge);
+        };
+        EXPECT_GT(found(0.99).along, found(1.01).along);
+        EXPECT_TRUE(serves(found(0.99), 1.02));
+        EXPECT_FALSE(serves(found(0.99), 1.04));
+        EXPECT_TRUE(serves(found(1.01), 0.98));
+        EXPECT_FALSE(serves(found(1.01), 0.96));
+    }
+}
+
 // Points become whole around half a radius. All at once, the force changed by up to 6 % there, by what is narrower until
 // then.
 TEST(SmallBalls, ForceHasNoStepWherePointsBecomeWhole)
