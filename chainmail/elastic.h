@@ -138,7 +138,7 @@ private:
             return {(slope + curvature * length) * length, curvature * length * length};
         }
     };
-    // d, the increment; or p = z + beta d, which the first step makes.
+    // d, of the increment; or p = z + beta (the last step), which the first step makes.
     struct Direction {
         Field field = Field::p;
         double beta = 0;
@@ -292,8 +292,8 @@ private:
     std::optional<Vec3> stuck_;           // the middle of the tissue that sticks to the tool that is led, at rest [m]
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
-    std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
-    double increment_ = 1;                           // of the last call, in the fields d and e
+    std::optional<std::array<double, 3>> products_;  // a . u, and of the increment d: a . d, e . d; where known
+    double increment_ = 1;                           // the last call's, in the fields d and e
     double stiffness_ = 0;                           // along the last step, of tissue and contacts
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()

@@ -86,7 +86,7 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
     return 0.0;
 }
 
-// Goes on along the last call's increment d, whose image e is known, as far as lowers the energy. The tissue's force and
+// Goes on along the last call's increment, whose image is known, as far as lowers the energy. The tissue's force and
 // energy go along the parabola: the next step evaluates them, or confirm().
 bool Elastic::warmStart(ElasticResult& result) noexcept
 {
@@ -265,8 +265,9 @@ void Elastic::again(ElasticResult& result) noexcept
 // Fields d and e become the increment itself.
 void Elastic::scaleIncrement() noexcept
 {
-    stack_.combine(Field::d, increment_ - 1.0, Field::d, Field::d);
-    stack_.combine(Field::e, increment_ - 1.0, Field::e, Field::e);
+    stack_.clear(Field::t);
+    stack_.combine(Field::t, increment_, Field::d, Field::d);
+    stack_.combine(Field::t, increment_, Field::e, Field::e);
     increment_ = 1.0;
 }
 

@@ -160,7 +160,7 @@ struct KeepResidual {
 };
 
 // or it is stored and smooths u, u += weight * diagonal (r - A u). The sweep has read a node for the last time before it
-// gets here.
+// gets here, but for the cells behind the end of a row, which have no stiffness.
 struct KeepSmooth {
     float weight;
     const float* diagonal;

@@ -32,10 +32,10 @@ using Floats = std::vector<float, CacheAligned<float>>;
 enum class Field : std::uint8_t {
     u,   // displacement [m]
     a,   // A u, by the elastic energy alone [N]
-    d,   // the last tick's increment of u
+    d,   // the last call's increment of u, over Elastic's scale of it
     e,   // and of a
     p,   // search direction
-    q,   // A p
+    q,   // A of what was gone of it
     r,   // residual: force of the contacts less a, where the node is a degree of freedom [N]
     f,   // right side of the cycle
     z,   // its answer

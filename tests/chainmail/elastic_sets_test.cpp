@@ -351,13 +351,13 @@ TEST(ElasticSets, AStepIsDirectedAndKeptElementByElement)
     }
 }
 
-// Where the increment itself is the direction: taken again, d is the step; confirmed, d stays.
+// Where the increment itself is the direction: taken again, d is the step; confirmed, it is what is kept of it.
 TEST(ElasticSets, TheDirectionMayBeTheIncrement)
 {
     Entry e;
     const std::size_t n = 3 * Entry::count;
-    for (const float keep : {0.0F, 1.0F}) {
-        const KeptStep step{.fraction = 1.0F, .base = 1.0F, .further = 0.1F, .length = 1.0F - keep, .keep = keep};
+    for (const auto& [length, keep] : {std::pair(1.3F, 0.0F), std::pair(0.0F, 0.7F)}) {
+        const KeptStep step{.fraction = 1.0F, .base = 1.0F, .further = 0.1F, .length = length, .keep = keep};
         e.expect(
             [&](const Kernels& k, float* y) {
                 StepOf own(e);
@@ -366,7 +366,7 @@ TEST(ElasticSets, TheDirectionMayBeTheIncrement)
                 std::array<double, 3> sums{};
                 k.keepStep(step, e.b(), to, n, sums.data());
             },
-            [&](std::size_t, float y) { return y; });
+            [&](std::size_t, float y) { return keep * y + length * y; });
     }
 }
 
