@@ -150,10 +150,8 @@ private:
     struct LastStep {
         Field direction = Field::d;
         Field image = Field::e;
-        Parabola tissue;     // along all of it, where it led
-        double length = 0;   // of it, in the sites' p
-        double stored = 1;   // of it, in the field `direction`
-        double ofImage = 1;  // of its image, in the field `image`
+        Parabola tissue;    // along all of it, where it led
+        double length = 0;  // of it, in the sites' p and in the field p
     };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
@@ -212,6 +210,7 @@ private:
     double refreshResidual() noexcept;
     void addContactForces() noexcept;
     void scaleIncrement() noexcept;
+    double lastInField() const noexcept { return last_.direction == Field::p ? last_.length : increment_; }
     void prepareContacts() noexcept;
     Along look() noexcept;
     double lineSearch(double slope, double curvature, Along start, int steps) const noexcept;
@@ -293,7 +292,7 @@ private:
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, and of the increment d: a . d, e . d; where known
-    double increment_ = 1;                           // the last call's, in the fields d and e
+    double increment_ = 1;                           // the last call's, in the fields d and e; after a step along p 1
     double stiffness_ = 0;                           // along the last step, of tissue and contacts
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()

@@ -190,7 +190,7 @@ struct Division {
 };
 /// @param spacing  of the finest cells [m]
 /// @param edge     ElasticBody::pieceEdge
-/// @param share    of the tool's patch, that is taken for its radius
+/// @param share    times the radius of the tool's patch
 Division piecesUnder(const ElasticTool& tool, double spacing, double edge, double share = 1.0) noexcept;
 /// Whether points found with a division still serve under a tool: until its patch is 3 % beyond where another begins.
 bool stillServes(const Division& found, const ElasticTool& tool, double spacing, double edge) noexcept;

@@ -42,7 +42,7 @@ Along Elastic::look() noexcept
         const auto product = stack_.dots(Field::d, Field::a, Field::e);
         products_ = {stack_.dot(Field::u, Field::a), increment_ * product[0], increment_ * increment_ * product[1]};
     }
-    last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}, 0.0, increment_, increment_};
+    last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}};
     return contacts;
 }
 
@@ -101,7 +101,6 @@ bool Elastic::warmStart(ElasticResult& result) noexcept
     products_.reset();
     last_.tissue = last_.tissue.from(length);
     last_.length = length;
-    last_.stored = last_.ofImage = increment_;
     return true;
 }
 
@@ -114,7 +113,7 @@ bool Elastic::confirm(double start) noexcept
         return false;
     }
     products_ = stack_.keepStep(Field::d, {.length = 0.0F, .keep = static_cast<float>(increment_)});
-    increment_ = last_.stored = last_.ofImage = 1.0;
+    increment_ = 1.0;
     return true;
 }
 
@@ -138,7 +137,7 @@ void Elastic::retreat() noexcept
 bool Elastic::takeLinearStep(Direction to, ElasticResult& result) noexcept
 {
     if (to.field == Field::p) {
-        stack_.direct(last_.direction, last_.stored * to.beta, 0.0);
+        stack_.direct(last_.direction, lastInField() * to.beta, 0.0);
     }
     to.tissue.curvature = -stack_.evaluate(to.field, Field::f, to.field, volume::SmallStrain{}).product;
     const double length = searchParabola(to, result);
@@ -167,7 +166,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
     double gone = 0.0;
     for (int i = 0, searches = 0; length != 0.0;) {
         if (gone == 0.0 && to.field == Field::p) {
-            stack_.direct(last_.direction, last_.stored * to.beta, length);
+            stack_.direct(last_.direction, lastInField() * to.beta, length);
         } else {
             stack_.combine(Field::u, length - gone, to.field, Field::u);
         }
@@ -212,7 +211,7 @@ void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
     products_ = stack_.keepStep(to.field, step);
     increment_ = 1.0;
     stiffness_ = to.tissue.curvature + to.contacts.curvature;
-    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length), length, again ? 1.0 : length, 1.0};
+    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length), length};
 }
 
 // One step of preconditioned conjugate gradients, conjugate to the last: along the correction z of the forces out of
@@ -222,7 +221,7 @@ bool Elastic::step(double limit, ElasticResult& result) noexcept
     double& nearness = nearness_[std::min<std::size_t>(result.cycles, nearness_.size()) - 1];
     const auto product = stack_.dots(Field::z, Field::a, last_.image);
     double own = last_.tissue.curvature;
-    double mixed = -last_.ofImage * product[1];
+    double mixed = -increment_ * product[1];
     double work = product[0];  // of the residual along z
     ValueAt correction(stack_.windows(), Field::z);
     for (ContactSite& s : active()) {

@@ -158,8 +158,8 @@ struct Kernels {
     void (*warmStart)(float step, const StepFields& to, std::size_t n) noexcept;
     /// p = z + beta last,  u += step p; last may be p
     void (*direct)(const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept;
-    /// q = fraction (f - base a),  a += q,  e = keep e + q,  u += further p,  d = keep d + length p; p may be d. sums: a .
-    /// u, a . d, e . d
+    /// q = fraction (f - base a),  a += q,  e = keep e + q,  u += further p,  d = keep d + length p; p may be d
+    /// sums: a . u, a . d, e . d
     void (*keepStep)(const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept;
     /// y = -mask y, for each of three components; @returns x . y
     double (*negate)(const float* mask, const float* x, float* y, std::size_t count) noexcept;

@@ -112,7 +112,7 @@ struct Finite {
         g[2].y = p[2][1];
         g[2].z = p[2][2];
         const Lanes bend = hourglassTurned(filled, mu, lambda, q, bending, f, column, m, g);
-        if constexpr (Layer::some) {
+        if constexpr (std::is_same_v<Layer, Layers>) {
             density += layers.finite(cell, lambda / (lambda + 2.0F * mu + tiny), q, h8, m, g);
         }
         // h^3 W is 32 h^2 times W of the scaled stiffness.

@@ -164,8 +164,6 @@ private:
 
 // Cells without layers: the code for those is not even there.
 struct NoLayers {
-    static constexpr bool some = false;
-
     explicit NoLayers(const CellLayers&) noexcept {}
     void small(std::size_t, Lanes, const Modes (&)[3], Modes (&)[3]) const noexcept {}
 };
@@ -173,8 +171,6 @@ struct NoLayers {
 // Adds what the layers of W cells have, where one of them has a layer.
 class Layers {
 public:
-    static constexpr bool some = true;
-
     explicit Layers(const CellLayers& layers) noexcept : layers_(layers) {}
 
     void small(std::size_t cell, Lanes s, const Modes (&m)[3], Modes (&g)[3]) const noexcept
