@@ -23,7 +23,8 @@ struct KernelVerification {
 };
 
 /// Solves the problems that have a closed form at spacings of 2, 1 and 0.5 mm (`quick`: without the last), and first touch,
-/// contacts of half a cell to two cells at several places in the grid, at 2 mm. Cost: minutes.
+/// contacts of a quarter of a cell to two cells at several places in the grid and surfaces at a quarter, half and three
+/// quarters of their cells (`quick`: half), at 2 mm. Cost: minutes.
 /// @param progress  is told what comes next
 std::vector<KernelVerification> verifyKernel(bool quick, const std::function<void(const std::string&)>& progress);
 
