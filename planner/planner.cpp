@@ -42,12 +42,6 @@ studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
     }
 }
 
-// A twentieth of the least error that is asked for in earnest.
-studies::ReferenceOptions optionsOf(const volume::Law& law)
-{
-    return {.law = law, .tolerance = 5e-4, .maxCycles = 60, .maxPoints = maxPoints};
-}
-
 class Planner {
 public:
     Planner(const haptics::SessionModel& model, const PlanRequest& request,
@@ -120,20 +114,32 @@ private:
 
     volume::Law finiteLaw() const { return volume::finiteOf(model_.scene.model.elastic.law); }
 
+    // To a twentieth of the least error that is asked for in earnest.
+    studies::ReferenceOptions optionsOf(const volume::Law& law, const char* what) const
+    {
+        return {
+            .law = law,
+            .tolerance = 5e-4,
+            .maxCycles = 60,
+            .maxPoints = maxPoints,
+            .progress = [=, this](auto look, auto looks) { progress_(fmt::format("{}, {} of {}", what, look, looks)); }};
+    }
+
     void solve()
     {
-        progress_("the converged solution");
+        progress_("the bodies");
         const studies::TrialBody finest =
             studies::trialBody(*model_.tissue, model_.surface, spacings.back(), poissonCap(), maxReferenceCells);
         path_ =
             studies::trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
         const std::array speeds{request_.speed};
-        reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(volume::SmallStrain{}));
+        reference_ =
+            studies::solveReference(finest.body, path_, speeds, optionsOf(volume::SmallStrain{}, "the converged solution"));
         plan_.strain = reference_.strain;
         plan_.finiteReference = reference_.strain > largeStrain;
         if (plan_.finiteReference) {
-            progress_("the converged solution at finite strain");
-            reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(finiteLaw()));
+            reference_ = studies::solveReference(finest.body, path_, speeds,
+                                                 optionsOf(finiteLaw(), "the converged solution at finite strain"));
         }
         plan_.referenceSpacing = finest.cells.spacing;
         plan_.referenceNodes = reference_.nodes;

@@ -13,7 +13,7 @@ namespace palpate::python {
 
 namespace {
 
-// Between two models that are tried: Ctrl-C ends the plan.
+// Before each look of the converged solution and each model that is tried: Ctrl-C ends the plan.
 void heedSignals(const std::string&)
 {
     if (ending()) {

@@ -240,7 +240,11 @@ Reference solveReference(const ElasticBody& body, const TrialPath& path, std::sp
     TrialLoad load(path);
     Elastic elastic(body, wholeGrid(1, options.law), load.load().focus);
     reference.nodes = elastic.nodes();
-    for (const TrialPose& pose : looksOf(path, speeds)) {
+    const auto looks = looksOf(path, speeds);
+    for (const TrialPose& pose : looks) {
+        if (options.progress) {
+            options.progress(reference.states.size() + 1, looks.size());
+        }
         load.set(pose);
         ElasticResult result;
         const double residual = converge(elastic, load.load(), options, result);

@@ -46,9 +46,10 @@ chainmail::ElasticOptions wholeGrid(int cycles, const volume::Law& law);
 
 struct ReferenceOptions {
     volume::Law law = volume::SmallStrain{};
-    double tolerance = 3e-5;                                          // residual, fraction of the contacts' forces
-    int maxCycles = 200;                                              // per look
-    std::size_t maxPoints = std::numeric_limits<std::size_t>::max();  // of Reference::position: every n-th free node
+    double tolerance = 3e-5;                                              // residual, fraction of the contacts' forces
+    int maxCycles = 200;                                                  // per look
+    std::size_t maxPoints = std::numeric_limits<std::size_t>::max();      // of Reference::position: every n-th free node
+    std::function<void(std::size_t look, std::size_t looks)> progress{};  // before each look, from 1; may throw to end it
 };
 
 /// Solves the looks of the path at all these speeds. Small strain is solved from rest at every look, so that no rounding is

@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <planner/planner.h>
 #include <studies/accuracy/accuracy.h>
 #include <studies/accuracy/references.h>
@@ -6,6 +7,7 @@
 #include <tests/error_of.h>
 #include <tests/studies/small_block.h>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace palpate::planner {
@@ -26,6 +28,25 @@ Plan planned(double error, double budget, bool all = false, bool needle = false)
     request.speed = 0.05;
     request.all = all;
     return planModel(model, request, [](const std::string&) {});
+}
+
+// The converged solution takes most of the time on a large body: who waits sees it go on, and whoever gives up is heard at
+// the next look.
+TEST(Planner, SaysEachLookOfTheConvergedSolutionAndMayBeEndedThere)
+{
+    const haptics::SessionModel block = studies::smallBlock();
+    PlanRequest request;
+    request.speed = 0.05;
+    std::vector<std::string> told;
+    const auto untilLook = [&](const std::string& what) {
+        told.push_back(what);
+        base::failIf(what.starts_with("the converged solution, 3 of"), "enough");
+    };
+    EXPECT_EQ(tests::errorOf([&] { planModel(block, request, untilLook); }), "enough");
+    ASSERT_EQ(told.size(), 4U);
+    for (std::size_t i = 1; i < told.size(); ++i) {
+        EXPECT_TRUE(told[i].starts_with(fmt::format("the converged solution, {} of ", i))) << told[i];
+    }
 }
 
 // 1000 slots x (2 + 1.5 x 10) ns + 100 points x (50 + 1.5 x 100) ns + 20 us.
