@@ -310,7 +310,7 @@ DeviceSample Trainee::read() noexcept
 
 void Trainee::observe(const TickRecord& record) noexcept
 {
-    const auto since = [this](bool now, double before) { return now ? std::max(before, 0.0) + tickSeconds : -1.0; };
+    const auto since = [](bool now, double before) { return now ? std::max(before, 0.0) + tickSeconds : -1.0; };
     probe_.observe(record);
     inserted_ = record.inserted;
     ahead_ = record.ahead;

@@ -1,10 +1,10 @@
 #!/usr/bin/python3 -B
 """Writes what ctest shall know of a test program: an entry for each suite, whose tests then share what they prepare.
 
-    list_suites.py FILE PREFIX SLOW ALONE PROGRAM...
+    list_suites.py FILE PREFIX SLOW ALONE NEVER PROGRAM...
 
 SLOW: lists as tests/slow.txt, separated by semicolons, or "". ALONE: a regular expression of suites that need the machine for themselves, or "".
-PROGRAM: with what it is started by.
+NEVER: one of suites that this build cannot run, or "". PROGRAM: with what it is started by.
 
 A test that SLOW names has an entry of its own, so that ctest can leave it out.
 """
@@ -37,10 +37,12 @@ def suites_of(program):
 
 
 def main():
-    file, prefix, slow, alone, *program = sys.argv[1:]
+    file, prefix, slow, alone, never, *program = sys.argv[1:]
     patterns = slow_ones(slow)
     entries, lonely = [], []
     for suite, tests in suites_of(program).items():
+        if never and re.fullmatch(never, suite):
+            continue
         before = len(entries)
         apart = [test for test in tests if any(re.match(pattern, f"{prefix}.{suite}.{test}") for pattern in patterns)]
         entries += [(f"{prefix}.{suite}.{test}", f"{suite}.{test}") for test in apart]
