@@ -1,4 +1,5 @@
 #include <base/error.h>
+#include <base/inputs.h>
 #include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
 #include <haptics/record_rows.h>
@@ -42,10 +43,8 @@ std::int64_t single(Database& database, const std::string& sql)
 
 std::string pathOf(const std::filesystem::path& file)
 {
-    std::error_code failed;
-    base::failIf(!std::filesystem::exists(file, failed), "{}: no such file; give the record of a session", file.native());
-    base::failIf(!std::filesystem::is_regular_file(file, failed), "{}: is not a file; give the record of a session",
-                 file.native());
+    const std::string why = base::whyNoFile(file);
+    base::failIf(!why.empty(), "{}: {}; give the record of a session", file.native(), why);
     return file.string();
 }
 

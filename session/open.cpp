@@ -147,6 +147,21 @@ void refuseNoScene(const std::filesystem::path& file)
                  "{}: is no scene: 'palpate import' makes a volume (.vdb) of a label map first", file.native());
 }
 
+// What a record's scene reads: where it was, or beside the record, if both were moved. The volume's hash in the record
+// tells whether it is that one.
+std::filesystem::path fileOfRecord(const std::string& record, const std::filesystem::path& file)
+{
+    std::error_code none;
+    if (file.empty() || std::filesystem::exists(file, none)) {
+        return file;
+    }
+    const std::filesystem::path beside = std::filesystem::path(record).parent_path() / file.filename();
+    base::failIf(!std::filesystem::exists(beside, none),
+                 "{}: its session reads {}, which is not there: bring it back, or copy it beside the record", record,
+                 file.native());
+    return beside;
+}
+
 }  // namespace
 
 volume::Tissue loadVolume(const std::filesystem::path& file)
@@ -210,11 +225,22 @@ std::string widerCells(const haptics::SessionModel& model)
 
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
 {
-    auto model = haptics::buildModel(datasets::parseRecordedScene(info.sceneText, info.sceneOrigin));
-    base::failIf(haptics::modelHash(model) != info.volumeHash,
-                 "{}: the volume or the tissue table of this session has changed since it was recorded; replay it with "
-                 "those it was recorded with",
-                 file);
+    Scene scene = datasets::parseRecordedScene(info.sceneText, info.sceneOrigin);
+    scene.source.file = fileOfRecord(file, scene.source.file);
+    scene.tissues = fileOfRecord(file, scene.tissues).string();
+    const std::string changed = fmt::format(
+        "{}: the volume or the tissue table of this session has changed since it was recorded; replay it with those it was "
+        "recorded with{}",
+        file, scene.source.file.empty() ? "" : fmt::format(" (now {})", scene.source.file.native()));
+    auto model = [&] {
+        try {
+            return haptics::buildModel(scene);
+        } catch (const std::runtime_error& e) {
+            // Another volume may lack what the scene aims at.
+            throw scene.source.file.empty() ? std::runtime_error(e.what()) : base::error("{}: {}", changed, e.what());
+        }
+    }();
+    base::failIf(haptics::modelHash(model) != info.volumeHash, "{}", changed);
     const std::string contradiction = haptics::contradictionIn(info, model);
     base::failIf(!contradiction.empty(), "{}: was changed: {}", file, contradiction);
     return model;

@@ -57,8 +57,9 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
 /// Words where the body's cells are wider than the scene asks for, since finer ones would be over 4 million; else "".
 std::string widerCells(const haptics::SessionModel& model);
 
-/// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now, and
-/// when the record says something else of its scene than the scene does.
+/// The session of a record again: same scene, same volume, which lies where it was or beside the record `file`. Throws
+/// std::runtime_error when the volume is another now or gone, and when the record says something else of its scene than the
+/// scene does.
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info);
 
 /// Says of `info` that its session starts now, on this machine.

@@ -204,6 +204,7 @@ void checkPart(const SweepArguments& o, const fs::path& place)
     if (!o.plan.empty()) {
         const auto [text, origin] = planText(o.plan);
         wantedOf(o, parsePlan(text, origin, namedScene));
+        checkPlanOfParts(o.folder, text, o.plan);
     } else if (fs::exists(fs::path(o.folder) / "plan.toml")) {
         wantedOf(o, SweepFolder(o.folder, "", false).plan());
     }
@@ -322,7 +323,7 @@ void merge(const SweepArguments& o)
 
 void report(const SweepArguments& o)
 {
-    const SweepFolder folder(o.report, "", false);
+    const SweepFolder folder = SweepFolder::ofResults(o.report);
     const auto rows = folder.rows();
     base::failIf(std::ranges::none_of(rows, [](const auto& r) { return r && !r->failed(); }),
                  "{}: no case is done yet: run the sweep first", o.report);

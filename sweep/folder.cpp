@@ -163,10 +163,23 @@ void SweepFolder::begin()
     base::writeWhole(folder_ / "plan.toml", plan_.text);  // the last: it makes the folder a sweep
 }
 
-SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
-    : folder_(fs::absolute(std::move(folder)).lexically_normal())
+SweepFolder::SweepFolder(fs::path folder) : folder_(fs::absolute(std::move(folder)).lexically_normal())
 {
     folder_ = folder_.has_filename() ? folder_ : folder_.parent_path();
+}
+
+SweepFolder SweepFolder::ofResults(const fs::path& folder)
+{
+    SweepFolder results(folder);
+    const fs::path file = results.folder_ / "plan.toml";
+    base::failIf(!fs::exists(file), "{}: holds no sweep: name the folder of a sweep", results.folder_.native());
+    results.plan_ = parsePlan(textOf(file), file, sceneOfFolder, false);
+    results.checkFiles();
+    return results;
+}
+
+SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold) : SweepFolder(std::move(folder))
+{
     const fs::path file = folder_ / "plan.toml";
     std::pair<std::string, fs::path> text;
     if (!given.empty()) {
@@ -190,11 +203,12 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         return;
     }
     plan_ = parsePlan(textOf(file), file, sceneOfFolder);
+    const json about = checkFiles();
     base::failIf(
         !given.empty() && text.first != plan_.text,
         "{}: holds another plan than {}: choose another folder, or leave out the plan to resume that of the folder",
         folder_.native(), given);
-    checkFiles();
+    checkInputs(about);
     base::failIf(
         !given.empty() && !areAlike(plan_.base, sceneOfPlan(text.first, text.second, namedScene)),
         "{}: its cases are of another scene than {} has now: choose another folder, or leave out the plan to resume "
@@ -202,7 +216,7 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         folder_.native(), given);
 }
 
-void SweepFolder::checkFiles()
+json SweepFolder::checkFiles()
 {
     const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
     base::failIf(!about.is_object(), "{}/sweep.json: is damaged: begin in another folder", folder_.native());
@@ -215,11 +229,17 @@ void SweepFolder::checkFiles()
                      (folder_ / name).native());
     }
     plan_.name = about.value("name", plan_.name);
-    if (const json now = inputsOf(plan_.base); about.value("inputs", json()) != now) {
-        throw base::error(
-            "{}: a file that its scene reads has changed since the sweep began ({}): bring "
-            "it back, or begin in another folder",
-            folder_.string(), now.dump());
+    return about;
+}
+
+void SweepFolder::checkInputs(const json& about) const
+{
+    const json then = about.value("inputs", json::object());
+    for (const auto& [file, hash] : inputsOf(plan_.base).items()) {
+        base::failIf(
+            !then.is_object() || then.value(file, json()) != hash,
+            "{}: {}, which its scene reads, has changed since the sweep began: bring it back, or begin in another folder",
+            folder_.native(), file);
     }
 }
 

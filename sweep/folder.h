@@ -4,6 +4,8 @@
 #include <sweep/lock.h>
 #include <sweep/plan.h>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -39,6 +41,9 @@ public:
     /// empty: that of the folder. `hold`: nobody else may work on it while this object lives. Throws std::runtime_error,
     /// also when the folder holds another plan, its inputs have changed, or another run holds it.
     SweepFolder(std::filesystem::path folder, const std::string& given, bool hold);
+    /// What is computed in a folder: for this no scene is tried, and the files that it reads may have changed or be gone.
+    /// Throws std::runtime_error, also where plan or scene in the folder are not those of its cases.
+    static SweepFolder ofResults(const std::filesystem::path& folder);
 
     const SweepPlan& plan() const noexcept { return plan_; }
     const std::filesystem::path& path() const noexcept { return folder_; }
@@ -65,10 +70,13 @@ public:
     std::filesystem::path record(std::size_t index) const;
 
 private:
+    explicit SweepFolder(std::filesystem::path folder);
     std::filesystem::path caseFile(std::size_t index) const;
     void begin();
-    // That plan, scene and what the scene reads are those that the cases are of; takes in the sweep's name.
-    void checkFiles();
+    // That plan and scene are those that the cases are of; takes in the sweep's name. Gives what sweep.json says.
+    nlohmann::json checkFiles();
+    // That what the scene reads is as it was.
+    void checkInputs(const nlohmann::json& about) const;
 
     std::filesystem::path folder_;
     SweepPlan plan_;

@@ -415,7 +415,7 @@ void applyConstraints(SweepPlan& plan, Section& top)
 
 }  // namespace
 
-SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene)
+SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene, bool probed)
 {
     const toml::table root = datasets::parseToml(text, origin.string());
     Section top(root, origin.string(), "");
@@ -451,8 +451,10 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     checkKeys(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);
-    probeCases(plan, origin.string());
-    probeOutputs(plan, origin.string());
+    if (probed) {
+        probeCases(plan, origin.string());
+        probeOutputs(plan, origin.string());
+    }
     return plan;
 }
 

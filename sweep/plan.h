@@ -103,9 +103,10 @@ struct SweepPlan {
 };
 
 /// Reads a plan. `baseScene` gives the scene that its key `scene` names. Throws std::runtime_error
-/// ("FILE:LINE: what is wrong"), also when a case's scene would be none.
+/// ("FILE:LINE: what is wrong"), also when a case's scene would be none: if `probed`.
 using SceneSource = datasets::Scene (*)(const std::string& what, const std::filesystem::path& origin);
-SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene);
+SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene,
+                    bool probed = true);
 /// The scene that a plan names alone. Throws std::runtime_error.
 datasets::Scene sceneOfPlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene);
 /// A built-in scene by name, a scene (.toml) or a volume (.vdb) from the plan's folder.

@@ -40,7 +40,8 @@ void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
 {
     base::failIf(
         from.plan().text != to.plan().text || datasets::sceneText(from.plan().base) != datasets::sceneText(to.plan().base),
-        "{}: is of another plan or scene than {}: it cannot be merged", from.path().native(), to.path().native());
+        "{}: is of another plan or scene than {}: it cannot be merged, move it elsewhere", from.path().native(),
+        to.path().native());
 }
 
 // Of plans that keep records. Whole or not at all: there is no row of it yet.
@@ -59,6 +60,19 @@ struct MergedRow {
     fs::path shard;
     SweepRow row;
 };
+
+// Folders of shards, and of runs on some cases.
+std::vector<fs::path> partsIn(const fs::path& folder)
+{
+    std::vector<fs::path> parts;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder / "shards", none)) {
+        if (fs::exists(entry.path() / "plan.toml")) {
+            parts.push_back(entry.path());
+        }
+    }
+    return parts;
+}
 
 bool hasCases(const fs::path& folder)
 {
@@ -205,15 +219,21 @@ void copyPlan(const fs::path& from, const fs::path& to)
     }
 }
 
+void checkPlanOfParts(const fs::path& folder, const std::string& text, const std::string& given)
+{
+    std::vector<fs::path> sweeps = partsIn(folder);
+    sweeps.push_back(folder);
+    for (const fs::path& sweep : sweeps) {
+        const auto there = base::contentOf(sweep / "plan.toml");
+        base::failIf(there && *there != text, "{}: holds another plan than {}: choose another folder after -o",
+                     sweep.native(), given);
+    }
+}
+
 std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& from, bool anyBuild)
 {
-    std::vector<fs::path> parts = from;
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator(folder / "shards", none)) {
-        if (fs::exists(entry.path() / "plan.toml")) {
-            parts.push_back(entry.path());
-        }
-    }
+    std::vector<fs::path> parts = partsIn(folder);
+    parts.insert(parts.end(), from.begin(), from.end());
     std::sort(parts.begin(), parts.end());
     base::failIf(parts.empty(), "{}: has no shards to merge: give their folders after --merge", folder.native());
     const bool hasPlan = fs::exists(folder / "plan.toml");

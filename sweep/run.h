@@ -42,6 +42,9 @@ std::filesystem::path casesFolder(const std::filesystem::path& folder, const std
 /// Makes `to` a folder of the same sweep, without cases.
 void copyPlan(const std::filesystem::path& from, const std::filesystem::path& to);
 
+/// Throws std::runtime_error where `folder` or a part of it, FOLDER/shards/*, is of another plan than `text`, which comes
+/// from `given`.
+void checkPlanOfParts(const std::filesystem::path& folder, const std::string& text, const std::string& given);
 /// Takes the rows of the folders `from` and of FOLDER/shards/* into `folder`, which is made where it holds no sweep, and
 /// held while this goes on. A case that is done in several places is the same in all; one that failed here and is done
 /// there is taken. Throws std::runtime_error where the folders are not of one plan and scene.

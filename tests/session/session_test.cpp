@@ -7,12 +7,16 @@
 #include <gtest/gtest.h>
 
 #include <tests/allocations.h>
+#include <tests/error_of.h>
+#include <tests/folder.h>
 
 #include <unistd.h>
 
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -58,6 +62,28 @@ TEST(Open, AnotherTargetIsNoVitalStructureAnyMore)
     ASSERT_EQ(model.scene.vital.size(), 2U);
     EXPECT_EQ(model.scene.vital[0].name, "vein");
     EXPECT_EQ(reopenSession("r.db", describeSession(model, "near-vessel", "hand")).scene.vital.size(), 2U);
+}
+
+// A record and its volume on another machine, or in a folder with another name.
+TEST(Open, ARecordsVolumeIsFoundBesideIt)
+{
+    const tests::Folder home;
+    const std::filesystem::path here(home / "here"), there(home / "there");
+    std::filesystem::create_directories(here);
+    SceneChanges changes;
+    changes.model = "spring";
+    openSession("block", changes).tissue->save(here / "v.vdb");
+    std::ofstream(here / "s.toml") << "name = \"own\"\n[volume]\nfile = \"v.vdb\"\n[model]\nlevel = \"spring\"\n"
+                                      "[target]\nstructure = \"tumour\"\n";
+    const auto info = describeSession(openSession(here / "s.toml", {}), here / "s.toml", "hand");
+    std::filesystem::rename(here, there);
+    EXPECT_EQ(reopenSession(there / "r.db", info).scene.source.file, there / "v.vdb");
+    EXPECT_EQ(tests::errorOf([&] { reopenSession(home / "r.db", info); }),
+              (home / "r.db").string() + ": its session reads " + (here / "v.vdb").string() +
+                  ", which is not there: bring it back, or copy it beside the record");
+    openSession("near-vessel", changes).tissue->save(there / "v.vdb");
+    EXPECT_NE(tests::errorOf([&] { reopenSession(there / "r.db", info); }).find("has changed since it was recorded"),
+              std::string::npos);
 }
 
 constexpr double length = 4.0;  // the scripted hand has punctured and fired by then [s]

@@ -83,6 +83,19 @@ TEST(Shards, AreMergedWithTheirRecords)
     EXPECT_EQ(mergeShards(home / "s", {}), 0U);
 }
 
+// Two plans in one folder would be refused at the merge, after hours.
+TEST(Shards, OfAnotherPlanAreRefusedBeforeTheyBegin)
+{
+    const palpate::tests::Folder home;
+    makeShards(home.path(), "one");
+    const auto refusal = [&](const std::string& text) {
+        return palpate::tests::errorOf([&] { checkPlanOfParts(home / "s", text, "q.toml"); });
+    };
+    EXPECT_EQ(refusal(planText(home / "p.toml").first), "");
+    EXPECT_NE(refusal("scene = \"block\"\n").find("holds another plan than q.toml: choose another folder"),
+              std::string::npos);
+}
+
 // Shards that were begun only: there would be a table without rows, and a folder that says it is this sweep.
 TEST(Shards, WithoutACaseAreNotMerged)
 {

@@ -20,6 +20,8 @@ namespace palpate::volume {
 
 namespace {
 
+constexpr double smallest = 5.0;  // of a body: what is smaller in all may have another unit than its file says [mm]
+
 // The direction that a letter of "LPS" names, in LPS; none for other letters.
 std::optional<std::pair<int, double>> directionOf(char letter)
 {
@@ -282,6 +284,11 @@ std::int64_t ImportedLabels::originalOf(std::uint16_t value) const noexcept
 ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptions& options)
 {
     ImportedLabels out = readLabels(path, options);
+    const Vec3 extent = 1e3 * out.image.affine.spacing() * Vec3(out.image.size);
+    if (std::max({extent.x, extent.y, extent.z}) < smallest) {
+        out.warnings.push_back(fmt::format("is {:.2g} x {:.2g} x {:.2g} mm in all: check the unit in its header", extent.x,
+                                           extent.y, extent.z));
+    }
     clean(out.warnings);
     for (LabelName& n : out.names) {
         n.name = printable(n.name);
