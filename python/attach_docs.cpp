@@ -1,5 +1,6 @@
 #include <python/convert.h>
 #include <python/docs.h>
+#include <python/explained_call.h>
 
 #include <cstdlib>
 #include <string>
@@ -42,6 +43,7 @@ void attachDocs(py::module_& module)
             PyMethodDef* const method = reinterpret_cast<PyCFunctionObject*>(function)->m_ml;
             std::free(const_cast<char*>(method->ml_doc));
             method->ml_doc = PYBIND11_COMPAT_STRDUP(text);
+            method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(explainedCall));
         } else {
             object.attr("__doc__") = text;
         }

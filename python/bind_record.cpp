@@ -126,7 +126,12 @@ std::shared_ptr<Modelled> modelOfRecord(const RecordBox& box)
 void bindRecord(py::module_& module)
 {
     py::class_<RecordBox>(module, "RecordFile")
-        .def(py::init<const std::filesystem::path&>(), py::arg("file"))
+        .def(py::init([](const py::object& file) {
+                 const auto from = pathOf(file, "file");
+                 refuseIf(from.empty(), "file: is empty: give the record of a session");
+                 return std::make_unique<RecordBox>(from);
+             }),
+             py::arg("file"))
         .def_property_readonly("file", [](const RecordBox& box) { return textOf(box.file); })
         .def_property_readonly("info", &infoOf)
         .def_property_readonly("scene_text", [](const RecordBox& box) { return box.record.info().sceneText; })

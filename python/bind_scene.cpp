@@ -22,8 +22,13 @@ namespace palpate::python {
 
 namespace {
 
-std::string textOfPath(const py::object& what)
+// The name of a built-in scene or a file, which the argument `name` is.
+std::string textOfPath(const py::object& what, const std::string& name)
 {
+    if (!py::isinstance<py::str>(what) && !py::hasattr(what, "__fspath__")) {
+        throw py::type_error(name + ": give a built-in scene's name, a file, or an object of palpate, not " +
+                             saidOf(what));
+    }
     const py::str text(py::module_::import("os").attr("fspath")(what));
     Py_ssize_t size = 0;
     const char* const utf8 = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
@@ -31,7 +36,8 @@ std::string textOfPath(const py::object& what)
         throw py::error_already_set();  // half a character is a ValueError
     }
     const std::string path{utf8, static_cast<std::size_t>(size)};
-    refuseIf(path.find('\0') != std::string::npos, "scene: the name holds a NUL character");
+    refuseIf(path.find('\0') != std::string::npos, name, ": the name holds a NUL character");
+    refuseIf(path.empty(), name, ": is empty: give a built-in scene's name or a file");
     return path;
 }
 
@@ -57,8 +63,7 @@ sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
         int overflow = 0;
         const std::int64_t whole = PyLong_AsLongLongAndOverflow(plain.ptr(), &overflow);
         if (overflow != 0) {
-            throwSceneError("key '" + key + "': " + py::str(plain).cast<std::string>() +
-                            " is out of range: whole numbers have 63 bits and a sign");
+            throwSceneError("key '" + key + "': the number is out of range: whole numbers have 63 bits and a sign");
         }
         return whole;
     }
@@ -175,7 +180,7 @@ SceneBox changed(const SceneBox& box, const py::dict& tables)
 SceneBox fromKeywords(const py::object& source, const py::kwargs& tables)
 {
     if (!source.is_none()) {
-        SceneBox box = sceneOf(source);
+        SceneBox box = sceneOf(source, "source");
         return tables.empty() ? box : changed(box, tables);
     }
     return ofTables(tables);
@@ -184,7 +189,7 @@ SceneBox fromKeywords(const py::object& source, const py::kwargs& tables)
 SceneBox forVolume(const py::object& what, const std::string& target)
 {
     if (!py::isinstance<VolumeBox>(what)) {
-        const std::string file = textOfPath(what);
+        const std::string file = textOfPath(what, "volume");
         auto tissue = std::make_shared<const volume::Tissue>(session::loadVolume(file));
         return {datasets::sceneForVolume(std::filesystem::absolute(file), *tissue, target), file, tissue, false};
     }
@@ -281,7 +286,7 @@ SceneBox sceneNamed(const std::string& what)
     }
 }
 
-SceneBox sceneOf(const py::object& what)
+SceneBox sceneOf(const py::object& what, const std::string& name)
 {
     if (py::isinstance<SceneBox>(what)) {
         return what.cast<SceneBox>();
@@ -289,7 +294,7 @@ SceneBox sceneOf(const py::object& what)
     if (py::isinstance<VolumeBox>(what)) {
         return forVolume(what, "");
     }
-    return sceneNamed(textOfPath(what));
+    return sceneNamed(textOfPath(what, name));
 }
 
 std::shared_ptr<const volume::Tissue> volumeOf(const SceneBox& box)

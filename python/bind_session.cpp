@@ -3,6 +3,7 @@
 #include <python/tick_rows.h>
 
 #include <base/error.h>
+#include <base/outputs.h>
 #include <haptics/record_bounds.h>
 #include <haptics/trainee.h>
 #include <session/devices.h>
@@ -424,6 +425,7 @@ void bindSession(py::module_& module)
         .def(py::init([](const py::object& scene, const py::object& record, const py::object& operatorName) {
                  const std::string file = record.is_none() ? "" : pathOf(record, "record").string();
                  refuseIf(file.empty() && !record.is_none(), "record: is empty: give a file, or None for no record");
+                 base::checkOutput(file);
                  const std::string name = wordOf(operatorName, "operator");
                  checkOperator(name);
                  return std::make_unique<SessionBox>(modelOf(scene), file, name);

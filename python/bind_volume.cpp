@@ -43,6 +43,7 @@ volume::TissueTable tableOf(const Path& file)
 
 std::unique_ptr<VolumeBox> open(const Path& file)
 {
+    refuseIf(file.empty(), "file: is empty: give a .vdb that palpate wrote");
     const Unlocked others;
     return boxed(session::loadVolume(file), std::filesystem::absolute(file));
 }
@@ -62,7 +63,7 @@ std::unique_ptr<VolumeBox> phantom(const std::string& name, const py::object& se
             spec.numbers[parameter] = number;
         } else {
             PyErr_Clear();
-            throw py::type_error(parameter + ": give a number or a word, not " + py::repr(value).cast<std::string>());
+            throw py::type_error(parameter + ": give a number or a word, not " + saidOf(value));
         }
     }
     const Unlocked others;
@@ -141,7 +142,7 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
         try {
             name.value = value.cast<std::uint16_t>();
         } catch (const py::cast_error&) {
-            throw py::value_error("tissues: keys are label values, 0 to 65535, not " + py::repr(value).cast<std::string>());
+            throw py::value_error("tissues: keys are label values, 0 to 65535, not " + saidOf(value));
         }
         if (py::isinstance<py::str>(said)) {
             name.name = name.tissue = said.cast<std::string>();
@@ -151,7 +152,7 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
             } catch (const py::cast_error&) {
                 throw py::value_error("tissues: label " + std::to_string(name.value) +
                                       ": give a tissue or (structure's name, tissue), not " +
-                                      py::repr(said).cast<std::string>());
+                                      saidOf(said));
             }
         }
         checkName(name);
@@ -239,6 +240,9 @@ std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& 
                  "image: has values that are not finite: give each voxel a number, e.g. with numpy.nan_to_num");
     }
     const auto names = namesOf(tissues);
+    const bool anyTissue = std::ranges::any_of(map.values, [](std::uint16_t label) { return label != 0; }) ||
+                           std::ranges::find(names, 0, &volume::LabelName::value) != names.end();
+    refuseIf(!anyTissue, "labels: no voxel is set: every label is 0, give an array that holds something");
     const Unlocked others;
     return boxed(
         volume::Tissue::fromLabels(map, tableOf(table), names, {{"source", "numpy"}}, companion ? &*companion : nullptr));
@@ -298,7 +302,7 @@ std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const
     request.input = path;
     request.mapping.map = map;
     request.mapping.defaultTissue = defaultTissue;
-    for (const auto& [label, tissue] : py::dict(set)) {
+    for (const auto& [label, tissue] : dictOf(set, "set")) {
         const std::string name = wordOf(py::str(label), "set");
         request.mapping.set.push_back(name + "=" + wordOf(tissue, ("set: label " + name).c_str()));
     }
@@ -373,6 +377,7 @@ void bindVolume(py::module_& module)
         .def(
             "save",
             [](VolumeBox& box, const Path& file) {
+                refuseIf(file.empty(), "file: is empty: give a name that ends in .vdb");
                 base::failIf(file.extension() != ".vdb", "{}: a volume is a .vdb file: name it so", file.native());
                 {
                     const Unlocked others;

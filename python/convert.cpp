@@ -51,7 +51,7 @@ std::uint64_t seedOf(const py::handle& given, const char* name)
     const auto whole = py::reinterpret_steal<py::object>(PyNumber_Index(given.ptr()));
     if (!whole) {
         PyErr_Clear();
-        throw py::type_error(std::string(name) + ": give a whole number, not " + py::repr(given).cast<std::string>());
+        throw py::type_error(std::string(name) + ": give a whole number, not " + saidOf(given));
     }
     const std::uint64_t value = PyLong_AsUnsignedLongLong(whole.ptr());
     if (PyErr_Occurred() != nullptr) {
@@ -64,7 +64,7 @@ std::uint64_t seedOf(const py::handle& given, const char* name)
 std::string wordOf(const py::handle& given, const char* name)
 {
     if (!py::isinstance<py::str>(given)) {
-        throw py::type_error(std::string(name) + ": give a word (str), not " + py::repr(given).cast<std::string>());
+        throw py::type_error(std::string(name) + ": give a word (str), not " + saidOf(given));
     }
     Py_ssize_t size = 0;
     const char* const utf8 = PyUnicode_AsUTF8AndSize(given.ptr(), &size);
@@ -77,6 +77,19 @@ std::string wordOf(const py::handle& given, const char* name)
     return word;
 }
 
+std::string saidOf(const py::handle& given)
+{
+    return py::module_::import("palpate._arguments").attr("said")(given).cast<std::string>();
+}
+
+py::dict dictOf(const py::object& given, const char* name)
+{
+    if (!py::isinstance<py::dict>(given) && !py::hasattr(given, "keys")) {
+        throw py::type_error(std::string(name) + ": give a dict, not " + saidOf(given));
+    }
+    return py::dict(given);
+}
+
 std::filesystem::path pathOf(const py::handle& given, const char* name)
 {
     PyObject* bytes = nullptr;
@@ -84,7 +97,7 @@ std::filesystem::path pathOf(const py::handle& given, const char* name)
         const bool isPath = PyErr_ExceptionMatches(PyExc_ValueError) != 0;
         PyErr_Clear();
         refuseIf(isPath, name, ": holds a NUL, or half a character");
-        throw py::type_error(std::string(name) + ": give a file, not " + py::repr(given).cast<std::string>());
+        throw py::type_error(std::string(name) + ": give a file, not " + saidOf(given));
     }
     const auto owned = py::reinterpret_steal<py::bytes>(bytes);
     return std::filesystem::path(std::string(owned));

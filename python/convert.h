@@ -44,6 +44,10 @@ void refuseMasked(const py::handle& given, const std::string& name);
 std::uint64_t seedOf(const py::handle& given, const char* name);
 /// A str of Python in UTF-8. Throws ValueError or TypeError that names it.
 std::string wordOf(const py::handle& given, const char* name);
+/// What an error says of a value that is refused, on one line: "'3' (str)".
+std::string saidOf(const py::handle& given);
+/// A dict, or a mapping as one. Throws TypeError that names it.
+py::dict dictOf(const py::object& given, const char* name);
 /// What os.fspath() makes of it. Throws ValueError or TypeError that names it.
 std::filesystem::path pathOf(const py::handle& given, const char* name);
 /// Text of C++, which may hold the names of files, as Python has those: what is no UTF-8 as surrogates.
@@ -76,7 +80,8 @@ void bindSession(py::module_& module);
 void bindRecord(py::module_& module);
 void bindPlan(py::module_& module);
 void bindSweep(py::module_& module);
-/// Gives everything the text that palpate/_palpate.pyi has of it. Throws where that names what is not there.
+/// Gives everything the text that palpate/_palpate.pyi has of it, and functions explainedCall(). Throws where that names what
+/// is not there.
 void attachDocs(py::module_& module);
 
 }  // namespace palpate::python

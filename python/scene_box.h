@@ -33,8 +33,8 @@ struct SceneBox {
 
 /// A scene by built-in name, TOML file or volume (.vdb). Throws palpate.SceneError.
 SceneBox sceneNamed(const std::string& what);
-/// The scene that an argument of Python means: a Scene, a name or a path.
-SceneBox sceneOf(const py::object& what);
+/// The scene that the argument `name` of Python means: a Scene, a Volume, a name or a path. Throws TypeError that names it.
+SceneBox sceneOf(const py::object& what, const std::string& name = "scene");
 /// Its volume, made where it is not loaded. Needs no GIL.
 std::shared_ptr<const volume::Tissue> volumeOf(const SceneBox& box);
 /// `work()`, which makes a volume or a model; its errors are throwModelError's.

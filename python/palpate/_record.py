@@ -80,7 +80,7 @@ class Record:
     complete: bool
 
     def __init__(self, file: str | os.PathLike[str]) -> None:
-        self._file = RecordFile(os.fspath(file))
+        self._file = RecordFile(file)
         self.ticks, self.events = self._file.read_ticks()
         for array in (self.ticks, self.events):
             array.flags.writeable = False
@@ -163,5 +163,5 @@ def score(what: Record | Session | str | bytes | os.PathLike[str]) -> dict[str, 
     if isinstance(what, (Record, Session)):
         return what.score()
     if isinstance(what, (str, bytes, os.PathLike)):
-        return RecordFile(os.fspath(what)).score()
+        return RecordFile(what).score()
     raise TypeError(f"score: give a Record, its file or a Session, not {what!r}")

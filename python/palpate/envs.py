@@ -13,6 +13,7 @@ import contextlib
 import multiprocessing
 import operator
 import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _palpate
+from ._arguments import said
 from ._errors import Error
 from ._palpate import Model, Scene, Session, Volume
 
@@ -162,6 +164,8 @@ class Biopsy(_Env):
         render_mode: str | None = None,
     ) -> None:
         step_seconds = self.ticks_per_step * _palpate.TICK_SECONDS
+        max_seconds, max_speed = _number(max_seconds, "max_seconds"), _number(max_speed, "max_speed")
+        entry_error = _number(entry_error, "entry_error")
         if not step_seconds / 2 < max_seconds < 1e6:
             raise ValueError(f"max_seconds: has to be a step, {step_seconds:g} s, at least, and below 1e6, not {max_seconds}")
         if not 0 < max_speed <= 10:
@@ -176,7 +180,7 @@ class Biopsy(_Env):
             raise ValueError(f"render_mode: is None or 'ultrasound', not {render_mode!r}")
         self.render_mode = render_mode
         self.max_steps = int(round(max_seconds / step_seconds))
-        self.max_speed, self.entry_error = float(max_speed), float(entry_error)
+        self.max_speed, self.entry_error = max_speed, entry_error
         self.action_space = _Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = _Box(-np.inf, np.inf, (16,), np.float32)
         self.session = None
@@ -187,7 +191,7 @@ class Biopsy(_Env):
         Returns:
             (observation, info)
         """
-        super().reset(seed=seed)
+        super().reset(seed=_seed(seed))
         random = self.np_random
         entry, aim = self.model.entry, self.model.aim
         line = (aim - entry) / np.linalg.norm(aim - entry)
@@ -263,6 +267,29 @@ def _numbers(values, shape, wanted):
     return array
 
 
+def _number(value, name):
+    """A number. Raises TypeError that names it."""
+    try:
+        return float(None if isinstance(value, (str, bytes)) else value)
+    except OverflowError:
+        return np.inf
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: has to be a number, not {said(value)}") from None
+
+
+def _seed(value):
+    """A seed of random numbers, or None. Raises TypeError or ValueError that names it."""
+    if value is None:
+        return None
+    try:
+        seed = operator.index(value)
+    except TypeError:
+        raise TypeError(f"seed: has to be a whole number, or None, not {said(value)}") from None
+    if seed < 0:
+        raise ValueError(f"seed: has to be 0 or more, not {seed}")
+    return seed
+
+
 def _count(value, name):
     """A whole number above 0. Raises TypeError or ValueError that names it."""
     try:
@@ -319,6 +346,8 @@ def _step(env, action):
 
 
 _ENDED = "a process of the environments has ended: see what it printed"
+_NOT_BEGUN = ('the processes of the environments have ended as they began: put what makes them below `if __name__ == "__main__":`; '
+              "where it is there, see what they printed")
 
 
 class Vector:
@@ -337,8 +366,8 @@ class Vector:
         make: what makes one; called in the processes, so it has to be a function of a module. Default: Biopsy.
         processes: 1 or more; default: all cores.
         seed: of all of them; default: another one each time.
-        context: how processes start, see multiprocessing. With "spawn", the default, a script needs the usual
-            `if __name__ == "__main__":`.
+        context: how processes start, see multiprocessing. With "spawn", the default, each reads the script again: there
+            this belongs below the usual `if __name__ == "__main__":`.
     """
 
     count: int
@@ -354,8 +383,12 @@ class Vector:
     ) -> None:
         count = _count(count, "count")
         processes = min(count, (os.cpu_count() or 1) if processes is None else _count(processes, "processes"))
-        seed = np.random.SeedSequence(seed).entropy
+        seed = np.random.SeedSequence(_seed(seed)).entropy
         start = multiprocessing.get_context(context)
+        if getattr(multiprocessing.current_process(), "_inheriting", False):
+            # A process that reads the script of its parent again, and found no `if __name__ == "__main__":` in it. The parent
+            # says so; here Python would print a traceback for each process.
+            sys.exit(1)
         self.count = count
         self._parts = np.array_split(np.arange(count), processes)
         self._pipes, self._processes = [], []
@@ -370,14 +403,15 @@ class Vector:
                 there.close()
                 self._pipes.append(here)
                 self._processes.append(process)
-            self._action_shape = (count, *[self._answer(pipe) for pipe in self._pipes][0])
+            self._action_shape = (count, *[self._answer(pipe, _NOT_BEGUN) for pipe in self._pipes][0])
         except BaseException:
             self.close()
             raise
 
     def reset(self, *, seed: int | None = None) -> NDArray[np.float32]:
         """Begins all episodes; without a seed they follow from those before. Returns count x 16 observations."""
-        return np.stack([observation for observation, _ in self._ask([("reset", seed)] * len(self._parts))])
+        requests = [("reset", _seed(seed))] * len(self._parts)
+        return np.stack([observation for observation, _ in self._ask(requests)])
 
     def step(
         self, actions: ArrayLike
@@ -437,11 +471,11 @@ class Vector:
             raise Error(_ENDED) from None
 
     @staticmethod
-    def _answer(pipe):
+    def _answer(pipe, ended=_ENDED):
         try:
             answer = pipe.recv()
         except (EOFError, ConnectionError):
-            raise Error(_ENDED) from None
+            raise Error(ended) from None
         if isinstance(answer, Exception):
             raise answer
         return answer

@@ -5,6 +5,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 import types
 import unittest
@@ -116,6 +117,19 @@ class Biopsy(unittest.TestCase):
             for value in values:
                 with self.subTest(name, value=value), self.assertRaisesRegex(ValueError, name):
                     envs.Biopsy(layered(), **{name: value})
+
+    def test_what_is_no_number_or_seed_is_named(self):
+        for name in ("max_seconds", "max_speed", "entry_error"):
+            for value in ("1", None, [1]):
+                with self.subTest(name, value=value), self.assertRaisesRegex(TypeError, f"^{name}: has to be a number, not "):
+                    envs.Biopsy(layered(), **{name: value})
+        env = make()
+        with envs.Vector(1, make, processes=1, seed=1) as vector:
+            for call in (env.reset, vector.reset, lambda seed: envs.Vector(1, make, seed=seed)):
+                for seed, error in ("x", TypeError), (1.5, TypeError), (-1, ValueError):
+                    with self.subTest(seed=seed), self.assertRaisesRegex(error, "^seed: has to be "):
+                        call(seed=seed)
+            np.testing.assert_array_equal(vector.reset(seed=3), vector.reset(seed=np.int64(3)))
 
     def test_a_scene_without_a_needle_is_refused(self):
         with self.assertRaisesRegex(palpate.Error, "no needle"):
@@ -327,6 +341,15 @@ os.kill(os.getpid(), signal.SIGKILL)
         for pid in left:
             os.kill(pid, signal.SIGKILL)
         self.fail("processes are left behind")
+
+    def test_a_script_without_the_guard_is_told_so_and_no_process_prints(self):
+        with tempfile.TemporaryDirectory() as folder:
+            script = pathlib.Path(folder) / "script.py"
+            script.write_text("import palpate\nenvs = palpate.envs.Vector(4, processes=2, seed=1)\n")
+            done = subprocess.run([sys.executable, "-B", script], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual(done.stderr.count("Traceback"), 1, done.stderr)
+        self.assertRegex(done.stderr.splitlines()[-1], 'Error: .*below `if __name__ == "__main__":`')
 
     def test_counts_that_are_none_are_refused(self):
         for name, arguments in {"count": lambda v: ((v, make), {}), "processes": lambda v: ((2, make), {"processes": v})}.items():
