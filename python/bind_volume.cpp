@@ -297,6 +297,7 @@ std::unique_ptr<VolumeBox> import(const Path& path, const py::object& set, const
                                   const std::string& imageSeries, bool ignoreFrame, const std::string& stiffnessFrom,
                                   double voxel, bool bodyFromImage, double bodyFromHull, const Path& tissues)
 {
+    refuseIf(path.empty(), "path: is empty: give a file or a folder");
     checkUnit(imageUnit);
     prepare::ImportRequest request;
     request.input = path;

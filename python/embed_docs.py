@@ -20,6 +20,15 @@ def signature(function):
     return f"{function.name}({arguments}){returned}"
 
 
+def plain_signature(function):
+    """As inspect.signature() reads it of a built-in function: with self and without annotations."""
+    arguments = function.args
+    for one in (*arguments.args, *arguments.kwonlyargs, arguments.vararg, arguments.kwarg):
+        if one is not None:
+            one.annotation = None
+    return f"{function.name}({ast.unparse(arguments)})\n--\n\n"
+
+
 def docs(body, before=""):
     """(qualified name, text) of what has a docstring."""
     for node in body:
@@ -30,6 +39,7 @@ def docs(body, before=""):
         is_property = any(isinstance(d, ast.Name) and d.id == "property" for d in getattr(node, "decorator_list", ()))
         if isinstance(node, ast.FunctionDef) and not is_property:
             text = (signature(node) + "\n\n" + text).strip()
+            text = plain_signature(node) + text
         if text:
             yield before + node.name, text
         if isinstance(node, ast.ClassDef):

@@ -13,6 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from . import _palpate
+from ._arguments import ClassSignature
 from ._errors import Error, SceneError
 from ._palpate import (
     DEADMAN,
@@ -48,6 +49,10 @@ __all__ = [
     "TICK_SECONDS", "Tick", "UNMARK", "Volume", "WARNINGS", "accuracy", "build", "merge", "phantoms", "plan", "press_path",
     "scenes", "score", "sweep", "sweep_outputs",
 ]
+
+
+for _kind in (Model, Scene, Session):
+    setattr(_kind, "__signature__", ClassSignature())
 
 
 def __getattr__(name: str) -> Any:

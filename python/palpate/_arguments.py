@@ -1,6 +1,7 @@
 """What is wrong with the arguments of a call of the C++ side, on one line. pybind11's own text has several and no advice."""
 
 import ast
+import inspect
 import operator
 import os
 import re
@@ -17,7 +18,25 @@ def said(value):
     except Exception:  # of somebody else's class; or too many digits
         text = ""
     kind = type(value).__name__
-    return f"{text} ({kind})" if 0 < len(text) <= 60 and text.isprintable() else f"a {kind}"
+    return f"{text} ({kind})" if 0 < len(text) <= 60 and text.isprintable() else f"a value of type {kind}"
+
+
+def path_of(value, name):
+    """The name of a file or folder as text. Raises TypeError that names it."""
+    try:
+        return os.fspath(value)
+    except TypeError:
+        raise TypeError(f"{name}: give the name of a file or a folder, not {said(value)}") from None
+
+
+class ClassSignature:
+    """The __signature__ of a class of the C++ side, which inspect.signature() does not find in its __init__."""
+
+    def __get__(self, instance, owner):
+        if inspect.isfunction(owner.__init__):
+            return None  # a class that Python derives has its own
+        whole = inspect.signature(owner.__init__)
+        return whole.replace(parameters=list(whole.parameters.values())[1:])
 
 
 def explained(text, given, named):
@@ -56,10 +75,11 @@ def _misplaced(takes, given, named):
     if unknown and takes.kwarg is None:
         return f"has no argument {unknown[0]!r}: it has {_listed(places + words) or 'none'}"
     if len(given) > len(places) and takes.vararg is None:
-        own = len(places[:1]) if places[:1] == ["self"] else 0
-        more = f"; give {_listed(words)} by name" if words else ""
-        few = f" ({_listed(places)})" if len(places) > own else ""
-        return f"takes {len(places) - own} arguments by position{few}, not {len(given) - own}{more}"
+        own = places[:1] == ["self"]
+        most = len(places) - own
+        few = f"{most} argument{'s' * (most > 1)} ({_listed(places)})" if most else "no arguments"
+        more = f": give {_listed(words)} by name" if words else ""
+        return f"takes {few} by position, not {len(given) - own}{more}"
     twice = [name for name in places[: len(given)] if name in named]
     if twice:
         return f"has the argument {twice[0]} twice: give it by position or by name"
@@ -90,18 +110,26 @@ def _wanted(kind, value):
     if kind.startswith("palpate."):
         name = kind.rpartition(".")[2]
         return None if name in (one.__name__ for one in type(value).__mro__) else f"an object of palpate.{name}"
-    wanted, convert = _TYPES.get(kind, (None, None))
+    wanted, convert = _TYPES.get(kind, ("", str))
     try:
-        if wanted:
-            convert(value)
-    except (TypeError, ValueError, OverflowError):
+        convert(value)
+    except _Unfit as unfit:
+        return f"{wanted} {unfit}"
+    except Exception:  # somebody else's class may raise what it likes
         return wanted
     return None
 
 
+class _Unfit(Exception):
+    """Of the right type, but not as it has to be."""
+
+
 def _word(value):
     if isinstance(value, str):
-        value.encode()  # half a character is a ValueError
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            raise _Unfit("without half a character (surrogate)") from None
     elif not isinstance(value, (bytes, bytearray)):
         raise TypeError
 
@@ -109,12 +137,15 @@ def _word(value):
 def _number(value):
     if isinstance(value, (str, bytes, bytearray)):
         raise TypeError
-    float(value)
+    try:
+        float(value)
+    except OverflowError:
+        raise _Unfit("below 1.8e308") from None
 
 
 def _whole(value):
     if not -(2**31) <= operator.index(value) < 2**31:
-        raise OverflowError
+        raise _Unfit("below 2**31")
 
 
 def _truth(value):
@@ -124,8 +155,13 @@ def _truth(value):
 
 
 def _file(value):
-    if b"\0" in os.fsencode(value):
-        raise ValueError
+    name = os.fspath(value)
+    try:
+        whole = b"\0" not in os.fsencode(name)
+    except UnicodeEncodeError:
+        whole = False
+    if not whole:
+        raise _Unfit("without NUL or half a character")
 
 
 def _table(value):
@@ -142,7 +178,7 @@ def _function(value):
 _TYPES = {
     "str": ("a word (str)", _word),
     "float": ("a number", _number),
-    "int": ("a whole number below 2**31", _whole),
+    "int": ("a whole number", _whole),
     "bool": ("True or False", _truth),
     "dict": ("a dict", _table),
     "os.PathLike": ("the name of a file", _file),

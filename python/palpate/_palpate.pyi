@@ -22,12 +22,12 @@ class Volume:
 
     @staticmethod
     def open(file: _Path) -> Volume:
-        """Reads a .vdb that palpate wrote. Raises palpate.Error."""
+        """Reads a .vdb that palpate wrote. Raises palpate.Error; ValueError for an empty name."""
     @staticmethod
     def import_(
         path: _Path,
         *,
-        set: Mapping[int | str, str] = ...,
+        set: Mapping[int | str, str] = {},
         map: str = "",
         default_tissue: str = "",
         image: _Path = "",
@@ -99,12 +99,13 @@ class Volume:
             table: tissue table (.toml) in place of the built-in one.
 
         Raises:
-            ValueError: shapes, types, the affine or the frame are not right; an array has a mask, or is not of numbers; a
-                structure's name is empty, holds a control character or is there twice.
+            ValueError: shapes, types, the affine or the frame are not right; every label is 0, and 0 has no tissue; an array has
+                a mask, or is not of numbers; a structure's name is empty, holds a control character or is there twice.
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:
-        """Writes a .vdb, and no other name, whole, or leaves what was there. Raises palpate.Error."""
+        """Writes a .vdb, and no other name, whole, or leaves what was there. Raises palpate.Error; ValueError for an
+        empty name."""
     @property
     def labels(self) -> NDArray[np.uint16]:
         """(i, j, k), read-only. The dense array is made once, when first asked for; further views share it and keep it alive,
@@ -299,7 +300,7 @@ class Session:
         Raises:
             palpate.SceneError, palpate.Error. ValueError, TypeError: record or operator is no name.
         """
-    def step(self, pose: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = True) -> Tick:
+    def step(self, pose: ArrayLike, buttons: ArrayLike = DEADMAN, fresh: ArrayLike = True) -> Tick:
         """One tick: a millisecond, unless Model.rate is another.
 
         Args:
@@ -314,7 +315,7 @@ class Session:
                 (NaN, beyond 10 m) raise nothing: they switch the force off, as a broken device would, and event "fault"
                 says so. palpate.Error: the session is closed, or at work in another thread.
         """
-    def run(self, poses: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = ...) -> NDArray[np.void]:
+    def run(self, poses: ArrayLike, buttons: ArrayLike = DEADMAN, fresh: ArrayLike = True) -> NDArray[np.void]:
         """A tick for each pose; the GIL is released. The same poses give the same bits as step() and `palpate replay`.
 
         Args:
@@ -328,7 +329,7 @@ class Session:
             ValueError: shapes or values are not right; nothing was done. palpate.Error: as step().
             KeyboardInterrupt: after a whole tick; `interrupted` has the rows so far and the session may go on.
         """
-    def advance(self, poses: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = ...) -> int:
+    def advance(self, poses: ArrayLike, buttons: ArrayLike = DEADMAN, fresh: ArrayLike = True) -> int:
         """run() without the rows. Returns how many ticks."""
     def perform(self, trainee: str = "script", seed: int = 1, seconds: float = 120.0) -> NDArray[np.void]:
         """A simulated hand does the scene's task: "script", or a trainee ("novice", "resident", "expert"), as `palpate train`.

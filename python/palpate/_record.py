@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._arguments import said
 from ._palpate import Model, RecordFile, Session
 
 if TYPE_CHECKING:
@@ -164,4 +165,4 @@ def score(what: Record | Session | str | bytes | os.PathLike[str]) -> dict[str, 
         return what.score()
     if isinstance(what, (str, bytes, os.PathLike)):
         return RecordFile(what).score()
-    raise TypeError(f"score: give a Record, its file or a Session, not {what!r}")
+    raise TypeError(f"score: give a Record, its file or a Session, not {said(what)}")

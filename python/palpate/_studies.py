@@ -23,11 +23,12 @@ def accuracy(file: str | os.PathLike[str] | None = None, *, command: str | os.Pa
         palpate.Error: the program is not there or failed, or the file holds no such figures.
     """
     from . import Error
+    from ._arguments import path_of
 
     if file is not None:
         source = file
         try:
-            text = pathlib.Path(file).read_bytes()
+            text = pathlib.Path(path_of(file, "file")).read_bytes()
         except OSError as error:
             raise Error(f"{file}: {error.strerror}: give what `palpate accuracy --json` wrote") from None
     else:

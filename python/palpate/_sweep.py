@@ -14,6 +14,7 @@ import sys
 import tempfile
 
 from . import _palpate
+from ._arguments import path_of, said
 from ._errors import Error
 from ._toml import dumps
 
@@ -53,9 +54,9 @@ def plan_of(scene, cases, *, procedure="press", outputs=None, repeats=1, seed=1,
     """
     rows = _rows(cases)
     if not isinstance(procedure, (str, collections.abc.Mapping)):
-        raise TypeError(f"sweep: procedure: give one of {', '.join(sweep_outputs())}, or a dictionary with its keys, not {procedure!r}")
+        raise TypeError(f"sweep: procedure: give one of {', '.join(sweep_outputs())}, or a dictionary with its keys, not {said(procedure)}")
     if outputs is not None and not isinstance(outputs, collections.abc.Iterable):
-        raise TypeError(f"sweep: outputs: give the name of an output, or a list of them (sweep_outputs() has them), not {outputs!r}")
+        raise TypeError(f"sweep: outputs: give the name of an output, or a list of them (sweep_outputs() has them), not {said(outputs)}")
     procedure = {"kind": procedure} if isinstance(procedure, str) else dict(procedure)
     plan = {"scene": os.fspath(scene), "seed": seed, "repeats": repeats, "records": records}
     if outputs is not None:
@@ -92,7 +93,7 @@ class SweepResult:
     """
 
     def __init__(self, folder):
-        self.folder = pathlib.Path(folder)
+        self.folder = pathlib.Path(path_of(folder, "folder"))
         table = self.folder / "table.csv"
         try:
             with open(table, newline="", encoding="utf-8") as text:
@@ -138,7 +139,7 @@ def _jobs(jobs):
     try:
         number = operator.index(jobs)
     except TypeError:
-        raise TypeError(f"sweep: jobs: give a whole number, not {jobs!r}") from None
+        raise TypeError(f"sweep: jobs: give a whole number, not {said(jobs)}") from None
     if number < 1:
         raise ValueError(f"sweep: jobs: give 1 or more, not {number}")
     return number
@@ -215,8 +216,8 @@ def sweep(plan, cases=None, *, folder=None, jobs=None, retry=False, any_build=Fa
     for name in options:
         if name not in _OPTIONS:
             raise TypeError(f"sweep() has no argument {name!r}; with cases it has {', '.join(_OPTIONS)} too")
-    folder = pathlib.Path(tempfile.mkdtemp(prefix="palpate-sweep-") if folder is None else folder)
-    given = os.fspath(plan)
+    given = path_of(plan, "plan")
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="palpate-sweep-") if folder is None else path_of(folder, "folder"))
     written = None
     if cases is not None:
         text = plan_of(_scene_path(plan), cases, **options)
@@ -263,5 +264,6 @@ def merge(folder, shards=(), *, any_build=False):
         palpate.Error: there are no shards, or they are of another plan or of different builds.
     """
     _need_sweeps()
-    _palpate.merge_shards(os.fspath(folder), [os.fspath(shard) for shard in shards], bool(any_build))
+    shards = [path_of(shard, "shards") for shard in shards]
+    _palpate.merge_shards(path_of(folder, "folder"), shards, bool(any_build))
     return SweepResult(folder)

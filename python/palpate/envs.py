@@ -89,6 +89,8 @@ def _key_of(source, scene):
 def _model_of(source):
     if isinstance(source, _palpate.Model):
         return source
+    if not isinstance(source, (str, os.PathLike, Scene, Volume)):
+        raise TypeError(f"scene: give a built-in scene's name, a file, or an object of palpate, not {said(source)}")
     scene = _palpate.Scene(source)
     key = _key_of(source, scene)
     model = _models.pop(key, None) or _palpate.Model(scene)
@@ -177,7 +179,7 @@ class Biopsy(_Env):
         if tool.get("kind", "needle") != "needle":
             raise Error(f"{self.model.scene.name}: the tool is no needle: choose a scene of a biopsy")
         if render_mode not in (None, "ultrasound"):
-            raise ValueError(f"render_mode: is None or 'ultrasound', not {render_mode!r}")
+            raise ValueError(f"render_mode: is None or 'ultrasound', not {said(render_mode)}")
         self.render_mode = render_mode
         self.max_steps = int(round(max_seconds / step_seconds))
         self.max_speed, self.entry_error = max_speed, entry_error
@@ -295,7 +297,7 @@ def _count(value, name):
     try:
         count = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name}: has to be a whole number, not {value!r}") from None
+        raise TypeError(f"{name}: has to be a whole number, not {said(value)}") from None
     if isinstance(value, (bool, np.bool_)) or count < 1:
         raise ValueError(f"{name}: has to be 1 or more, not {value!r}")
     return count

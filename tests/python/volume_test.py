@@ -115,7 +115,7 @@ class FromNumpy(InFolder):
         palpate.Volume.from_numpy(cube(), AFFINE, {1: "fat", 2: "fat"})
 
     def test_what_is_wrong_with_a_volume_in_memory_names_no_file(self):
-        for labels, tissues, wrong in ((np.zeros((5, 5, 5), np.uint8), {}, "^has no labels of tissue"),
+        for labels, tissues, wrong in ((cube(), {1: "air", 2: "air"}, "^has no labels of tissue"),
                                        (cube(), {1: ("a", "fat"), 2: ("b", "fat")}, "^no tumour or lesion to aim at: choose .* one of a, b$")):
             volume = palpate.Volume.from_numpy(labels, AFFINE, tissues)
             with self.subTest(wrong), self.assertRaisesRegex(palpate.Error, wrong):
