@@ -80,8 +80,8 @@ void bindSession(py::module_& module);
 void bindRecord(py::module_& module);
 void bindPlan(py::module_& module);
 void bindSweep(py::module_& module);
-/// Gives everything the text that palpate/_palpate.pyi has of it, and functions explainedCall(). Throws where that names what
-/// is not there.
+/// Gives everything the text that palpate/_palpate.pyi has of it, and functions explainedCall(). Throws where that names
+/// what is not there.
 void attachDocs(py::module_& module);
 
 }  // namespace palpate::python

@@ -387,7 +387,7 @@ class Vector:
         processes = min(count, (os.cpu_count() or 1) if processes is None else _count(processes, "processes"))
         seed = np.random.SeedSequence(_seed(seed)).entropy
         start = multiprocessing.get_context(context)
-        if getattr(multiprocessing.current_process(), "_inheriting", False):
+        if start.get_start_method() != "fork" and getattr(multiprocessing.current_process(), "_inheriting", False):
             # A process that reads the script of its parent again, and found no `if __name__ == "__main__":` in it. The parent
             # says so; here Python would print a traceback for each process.
             sys.exit(1)
