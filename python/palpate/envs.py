@@ -387,7 +387,8 @@ class Vector:
         processes = min(count, (os.cpu_count() or 1) if processes is None else _count(processes, "processes"))
         seed = np.random.SeedSequence(_seed(seed)).entropy
         start = multiprocessing.get_context(context)
-        if start.get_start_method() != "fork" and getattr(multiprocessing.current_process(), "_inheriting", False):
+        reads_script = start.get_start_method() != "fork"
+        if reads_script and getattr(multiprocessing.current_process(), "_inheriting", False):
             # A process that reads the script of its parent again, and found no `if __name__ == "__main__":` in it. The parent
             # says so; here Python would print a traceback for each process.
             sys.exit(1)
@@ -405,7 +406,8 @@ class Vector:
                 there.close()
                 self._pipes.append(here)
                 self._processes.append(process)
-            self._action_shape = (count, *[self._answer(pipe, _NOT_BEGUN) for pipe in self._pipes][0])
+            ended = _NOT_BEGUN if reads_script else _ENDED
+            self._action_shape = (count, *[self._answer(pipe, ended) for pipe in self._pipes][0])
         except BaseException:
             self.close()
             raise
