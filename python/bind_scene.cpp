@@ -26,8 +26,7 @@ namespace {
 std::string textOfPath(const py::object& what, const std::string& name)
 {
     if (!py::isinstance<py::str>(what) && !py::hasattr(what, "__fspath__")) {
-        throw py::type_error(name + ": give a built-in scene's name, a file, or an object of palpate, not " +
-                             saidOf(what));
+        throw py::type_error(name + ": give a built-in scene's name, a file, or an object of palpate, not " + saidOf(what));
     }
     const py::str text(py::module_::import("os").attr("fspath")(what));
     Py_ssize_t size = 0;

@@ -151,8 +151,7 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
                 std::tie(name.name, name.tissue) = said.cast<std::pair<std::string, std::string>>();
             } catch (const py::cast_error&) {
                 throw py::value_error("tissues: label " + std::to_string(name.value) +
-                                      ": give a tissue or (structure's name, tissue), not " +
-                                      saidOf(said));
+                                      ": give a tissue or (structure's name, tissue), not " + saidOf(said));
             }
         }
         checkName(name);
