@@ -178,6 +178,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         player.emplace(words.replay);
         options.session = player->session();
         options.playback = &player->playback();
+        options.record = words.replay;
         if (words.at >= 0)
             player->startAt(options.from = momentIn(words, *player));
         if (!words.ghost.empty())

@@ -19,8 +19,11 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -122,6 +125,15 @@ private:
     std::optional<MovieFile> movie_;
 };
 
+// Who erases a record does not want a film of it either.
+void failIfGone(const ViewerOptions& options)
+{
+    std::error_code failed;
+    const bool gone = !options.record.empty() && !std::filesystem::exists(options.record, failed) && !failed;
+    base::failIf(gone, "{}: is no longer there, it was erased or moved: {}", options.record.native(),
+                 options.movie.empty() ? "the pictures end here" : "no film of it is kept");
+}
+
 // Asks whoever plays a record for the tick at `time`; whether it is there.
 bool askFor(Playback& playback, double time, const Follower& follower)
 {
@@ -142,6 +154,7 @@ void writeAll(const ViewerOptions& options, const std::atomic<int>& stop, Pictur
     bool any = false;
     while (!stop && follower.ending() != channel::Ending::finished &&
            (options.frames == 0 || outputs.written() < options.frames)) {
+        failIfGone(options);
         follower.poll(picture);
         double next = 0;
         if (options.playback != nullptr) {
@@ -178,6 +191,21 @@ void writeAll(const ViewerOptions& options, const std::atomic<int>& stop, Pictur
     }
 }
 
+// Whether there is a film. The record is looked for again once it has its name: what is erased after that finds it.
+bool finishFilm(const ViewerOptions& options, Outputs& outputs)
+{
+    failIfGone(options);
+    const bool filmed = outputs.finish();
+    try {
+        failIfGone(options);
+    } catch (const std::runtime_error&) {
+        std::error_code ignored;
+        std::filesystem::remove(filmed ? options.movie : "", ignored);
+        throw;
+    }
+    return filmed;
+}
+
 }  // namespace
 
 ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>& stop)
@@ -194,7 +222,7 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>
     setUp(picture, options);
     Follower follower(options.session, options.wait, options.result);
     writeAll(options, stop, picture, follower, outputs);
-    const bool filmed = outputs.finish();
+    const bool filmed = finishFilm(options, outputs);
     ViewerFigures figures = follower.figures();
     figures.filmed = filmed;
     figures.display = figures.frames > 0 ? picture.display() : "";

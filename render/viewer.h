@@ -70,6 +70,7 @@ struct ViewerOptions {
     double wait = 10;                      // how long without a session before giving up [s]
     std::uint64_t frames = 0;              // end after so many pictures; 0 = no limit
     Playback* playback = nullptr;          // of the session, when it is a record
+    std::filesystem::path record;          // its file; where it is removed meanwhile, no film of it is kept
 };
 
 /// A picture, by the clock CLOCK_MONOTONIC.
@@ -98,7 +99,7 @@ struct ViewerFigures {
 /// Shows a session until it has ended, its window is closed, or SIGINT or SIGTERM comes. Attaches late, attaches again when
 /// the session is started again, and never makes the simulation wait. Where there is no display, `offscreen` and `movie`
 /// start one of its own. Throws std::runtime_error when there is no session within `wait`, the session was killed, there is
-/// no display, or folder or movie cannot be written.
+/// no display, folder or movie cannot be written, or the record of a film is no longer there.
 ViewerFigures runViewer(const ViewerOptions& options);
 
 }  // namespace palpate::render

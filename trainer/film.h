@@ -23,13 +23,15 @@ public:
               const std::filesystem::path& log);
     /// Whether one was made and has come to its end.
     bool ended() noexcept { return viewer_ && viewer_->ended(); }
-    /// Says its name in `told`, or in `notice` why there is none.
+    /// Says its name in `told`, or in `notice` why there is none: no film of a record that was erased meanwhile is kept.
     /// @pre  it has ended
     void take(std::string& told, std::string& notice);
 
 private:
+    void removeHalf() noexcept;
+
     std::optional<Running> viewer_;
-    std::filesystem::path made_, making_;  // when it is whole, and until then
+    std::filesystem::path record_, made_, making_;  // of the session; of the film when it is whole, and until then
 };
 
 }  // namespace palpate::trainer

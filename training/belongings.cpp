@@ -53,20 +53,43 @@ void removeOne(const fs::path& file, Erased& erased)
     }
 }
 
+// What the trainer's window or palpate-view made of a record: a film or pictures, whole, cut off or still being made.
+void removeFilms(const fs::path& record, Erased& erased)
+{
+    for (const char* extension : {".mp4", ".mp4.part", ".part.mp4", ".part.mp4.part", ".pictures", ".part.pictures"}) {
+        removeOne(fs::path(record).replace_extension(extension), erased);
+    }
+}
+
 // The record last: until it is gone it says whose the other files are.
 void removeRecord(const fs::path& file, Erased& erased)
 {
     for (const char* suffix : {"-wal", "-shm", "-journal"}) {
         removeOne(file.string() + suffix, erased);
     }
-    if (file.extension() == ".db") {
-        // Its figures, what the trainer's window made of it (a film or pictures, whole or cut off), and ultrasound
-        // pictures.
-        for (const char* extension : {".json", ".mp4", ".part.mp4", ".pictures", ".part.pictures", ".ultrasound"}) {
-            removeOne(fs::path(file).replace_extension(extension), erased);
-        }
+    const bool closed = file.extension() == ".db";
+    if (closed) {
+        removeOne(fs::path(file).replace_extension(".json"), erased);
+        removeOne(fs::path(file).replace_extension(".ultrasound"), erased);
+        removeFilms(file, erased);
     }
     removeOne(file, erased);
+    // A film that came to its end meanwhile; its writer looks for the record after that, and removes a later one itself.
+    closed ? removeFilms(file, erased) : void();
+}
+
+// A film that is being made ("X.mp4.part", in the window "X.part.mp4.part") goes with the record beside it, or stays with
+// it.
+bool isFilmOfRecord(const fs::path& part)
+{
+    fs::path film = part.stem();
+    if (film.extension() != ".mp4") {
+        return false;
+    }
+    film = film.stem();
+    film.replace_extension(film.extension() == ".part" ? ".db" : film.extension().string() + ".db");
+    std::error_code none;
+    return fs::exists(part.parent_path() / film, none) || !fs::exists(part, none);
 }
 
 // Older versions gave people whose names differ in signs only the same pages, which then stay.
@@ -134,6 +157,9 @@ Erased removeBelongings(const Belongings& of)
     }
     std::ranges::sort(found);
     for (const fs::path& file : found) {
+        if (isFilmOfRecord(file)) {
+            continue;
+        }
         const auto whose = operatorOf(file);
         if (whose == of.name) {
             removeUnlessShared(file, of, erased);

@@ -281,6 +281,27 @@ TEST(ReplayView, AFilmThatASignalHasEndedIsSaidToBe)
     EXPECT_TRUE(fs::exists(film));
 }
 
+// The viewer has the record open and could go on.
+TEST(ReplayView, OfARecordThatIsErasedMeanwhileNoFilmIsKept)
+{
+    if (!canDraw() || !installed("ffmpeg"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and ffmpeg (packages xvfb and ffmpeg)";
+    const Folder folder;
+    const std::string record = folder / "s.db", film = folder / "s.mp4";
+    fs::copy_file(threeSeconds(), record);
+    Program view("palpate-view", {"--replay", record, "--movie", film, "--size", "320x320"});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!fs::exists(film + ".part") && std::chrono::steady_clock::now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    fs::remove(record);
+    const Outcome outcome = view.wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(outcome.err,
+              "palpate-view: " + record + ": is no longer there, it was erased or moved: no film of it is kept\n");
+    EXPECT_FALSE(fs::exists(film));
+    EXPECT_FALSE(fs::exists(film + ".part"));
+}
+
 // Ended before its first picture: ffmpeg has made a file of 262 bytes, which nothing plays.
 TEST(ReplayView, AFilmWithoutPicturesIsNoFile)
 {

@@ -69,6 +69,28 @@ TEST(Errands, AReplayThatFailedSaysWhy)
     EXPECT_EQ(replay("palpate-view: all is well", 0), "") << "and what was wrong before is gone";
 }
 
+// Erased between the viewer's last look at the record and the window's.
+TEST(Errands, OfARecordThatIsErasedMeanwhileNoFilmIsKept)
+{
+    const Folder folder;
+    SessionFolder sink(folder / "sessions");
+    Errands errands(folder.path(), sink);
+    State state;
+    state.cases.emplace_back();
+    state.files.record = folder / "s.db";
+    const auto film = [&](const std::string& meanwhile) {
+        std::ofstream(state.files.record) << "x";
+        makeScript(folder / "palpate-view", meanwhile + "\nfor last; do :; done\necho x >\"$last\"");
+        errands.run(Errand::makeFilm, state);
+        lookUntil(errands, state, [&] { return !state.filming; });
+        return std::filesystem::exists(folder / "s.mp4") || std::filesystem::exists(folder / "s.pictures");
+    };
+    EXPECT_TRUE(film("")) << state.notice;
+    EXPECT_FALSE(film("rm \"$2\""));
+    EXPECT_NE(state.notice.find("no film of it is kept"), std::string::npos) << state.notice;
+    EXPECT_EQ(state.told, "");
+}
+
 // Where the home cannot be written, the first screen says it in the user's words, not in those of a command.
 TEST(Errands, AHomeThatCannotBeWrittenIsSaidInWords)
 {

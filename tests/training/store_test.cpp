@@ -305,7 +305,8 @@ TEST(ProfileStore, ErasingLeavesNoFileOfThePersonAndAllOfOthers)
     fs::create_directories(window / "kept.pictures");
     fs::create_directories(window / "of-bert.pictures");
     for (const char* const name :
-         {"kept.mp4", "kept.pictures/kept.png", "killed.part.mp4", "of-bert.mp4", "of-bert.pictures/of-bert.png"}) {
+         {"kept.mp4", "kept.mp4.part", "kept.pictures/kept.png", "killed.part.mp4", "killed.part.mp4.part", "of-bert.mp4",
+          "of-bert.part.mp4.part", "of-bert.pictures/of-bert.png"}) {
         std::ofstream(window / name) << "x";
     }
     for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
@@ -314,7 +315,7 @@ TEST(ProfileStore, ErasingLeavesNoFileOfThePersonAndAllOfOthers)
                           name == "progress-anna.html";
         (hers ? gone : stay).push_back(entry.path());
     }
-    ASSERT_EQ(gone.size(), 4 * 3 + 3 + 1 + 4U);
+    ASSERT_EQ(gone.size(), 4 * 3 + 3 + 1 + 6U);
 
     const Erased erased = store.erase(anna);
     for (const fs::path& file : gone) {
