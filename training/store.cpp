@@ -5,6 +5,7 @@
 #include <base/mapped.h>
 #include <base/nearest.h>
 #include <base/outputs.h>
+#include <base/room.h>
 #include <base/utc.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
@@ -166,11 +167,26 @@ bool canBeWritten(const fs::path& place)
     return ::faccessat(AT_FDCWD, place.c_str(), W_OK, AT_EACCESS) == 0;
 }
 
-// A file without a log is read as it is, since a log's index could not be made beside it.
+// The index of a log, which SQLite makes even to read, and a page of the log.
+bool hasRoom(const fs::path& place)
+{
+    constexpr std::size_t enough = 64 << 10;  // [bytes]
+    return base::hasRoom(place.parent_path(), enough);
+}
+
+// A file without a log, or with an empty one, is read as it is, since a log's index could not be made beside it.
 std::string readOnlyName(const fs::path& file)
 {
     std::error_code none;
-    return haptics::format::uriOf(file, !fs::exists(file.string() + "-wal", none));
+    const auto log = fs::file_size(file.string() + "-wal", none);
+    return haptics::format::uriOf(file, none || log == 0);
+}
+
+// On a full disk SQLite says that it is full, or that a file could not be made longer.
+std::string inWords(const fs::path& file, const std::string& what)
+{
+    const bool full = what == sqlite3_errstr(SQLITE_FULL) || (what == sqlite3_errstr(SQLITE_IOERR) && !hasRoom(file));
+    return full ? "the disk is full: make room, then try again" : what;
 }
 
 // Does the work, and says which file its errors are about.
@@ -180,7 +196,7 @@ auto guarded(const fs::path& file, const Work& work)
     try {
         return work();
     } catch (const std::runtime_error& e) {
-        throw base::error("{}: {}", file.string(), e.what());
+        throw base::error("{}: {}", file.string(), inWords(file, e.what()));
     }
 }
 
@@ -196,13 +212,22 @@ ProfileStore::ProfileStore(const fs::path& file) : file_(placeOf(file))
     });
 }
 
-// What cannot be written is read into memory, where one of an older version can be brought up to date.
+// What cannot be written, also for want of room, is read into memory, where one of an older version can be brought up to
+// date. Where another program has the file open, the log's index is there.
 ProfileStore ProfileStore::toRead(const fs::path& file)
 {
     const fs::path place = placeOf(file);
     const bool there = ::access(place.c_str(), F_OK) == 0 || errno != ENOENT;
-    if (there && canBeWritten(place) && canBeWritten(place.parent_path())) {
-        return ProfileStore(place);
+    std::error_code none;
+    const bool room = hasRoom(place) || fs::exists(place.string() + "-shm", none);
+    if (there && room && canBeWritten(place) && canBeWritten(place.parent_path())) {
+        try {
+            return ProfileStore(place);
+        } catch (const std::runtime_error&) {
+            if (hasRoom(place)) {
+                throw;
+            }
+        }
     }
     ProfileStore store;
     store.file_ = place;

@@ -79,7 +79,7 @@ public:
     /// @param file  empty: the standard one
     explicit ProfileStore(const std::filesystem::path& file);
     /// Opens the file for reading, and makes none: one that is not there has nobody. One that cannot be written, or whose
-    /// folder cannot, is read as it is at this moment.
+    /// folder cannot, also because the disk is full, is read as it is at this moment.
     static ProfileStore toRead(const std::filesystem::path& file);
     ~ProfileStore();
     ProfileStore(ProfileStore&&) noexcept;

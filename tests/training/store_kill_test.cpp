@@ -1,14 +1,19 @@
 #include <training/store.h>
 
 #include <haptics/record_format.h>
+#include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
 
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
+#include <fstream>
+#include <iterator>
 #include <random>
 #include <string>
 
@@ -97,6 +102,57 @@ TEST(ProfileStoreKilled, LosesNothingAndHalvesNothing)
         ASSERT_EQ(check.text(0), "ok");
     }
     EXPECT_GT(known, 0U) << "the processes were killed before they stored anything";
+}
+
+// No file can become longer, as on a disk that is full.
+class NoRoom {
+public:
+    NoRoom() : handler_(std::signal(SIGXFSZ, SIG_IGN))
+    {
+        ::getrlimit(RLIMIT_FSIZE, &before_);
+        const rlimit none{0, before_.rlim_max};
+        ::setrlimit(RLIMIT_FSIZE, &none);
+    }
+    ~NoRoom()
+    {
+        ::setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+    NoRoom& operator=(NoRoom&&) = delete;
+
+private:
+    rlimit before_{};
+    void (*handler_)(int);
+};
+
+// Alone; beside what an older version left, which has begun a log in vain; beside another program, with a change in its
+// log.
+TEST(ProfileStoreFullDisk, ReadsAndSaysThatItIsFullWhereItWouldWrite)
+{
+    const tests::Folder folder;
+    const fs::path file = folder / "p.db";
+    const auto filesThere = [&] { return std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()); };
+    std::string written;
+    const auto peopleOnAFullDisk = [&](bool writes) {
+        const NoRoom full;
+        std::size_t people = 0;
+        const std::string error = tests::errorOf([&] { people = ProfileStore::toRead(file).people().size(); });
+        written = writes ? tests::errorOf([&] { ProfileStore(file).add("bert", Hand::right); }) : "";
+        return error + std::to_string(people);
+    };
+    {
+        ProfileStore store(file);
+        store.add("anna", Hand::right);
+        EXPECT_EQ(peopleOnAFullDisk(false), "1");
+    }
+    EXPECT_EQ(peopleOnAFullDisk(false), "1");
+    EXPECT_EQ(filesThere(), 1) << "reading leaves nothing";
+    std::ofstream(file.string() + "-wal") << "";
+    std::ofstream(file.string() + "-shm") << "xyz";
+    EXPECT_EQ(peopleOnAFullDisk(true), "1");
+    EXPECT_EQ(written, file.string() + ": the disk is full: make room, then try again");
+    ProfileStore(file).add("bert", Hand::right);
+    EXPECT_EQ(filesThere(), 1);
 }
 
 }  // namespace
