@@ -77,7 +77,8 @@ struct TrainArguments {
     double seconds = 0;
     std::string session, operatorName;
     std::string record, report, json, pictures;
-    bool ownRecord = true;  // false: a record only for the pictures, which is removed
+    std::shared_ptr<base::Descriptor> room;  // for the figures, until they are written
+    bool ownRecord = true;                   // false: a record only for the pictures, which is removed
     std::vector<std::string> inject;
     session::Faults faults;  // what `inject` says
 };
@@ -329,6 +330,7 @@ void prepare(TrainArguments& o, Training& training)
     checkDevice(o);
     checkFaults(o);
     checkOutputs(o);
+    o.room = roomForFigures(o.json);
 }
 
 // In a test the hand does not begin on the plan. Which place it is follows from --seed, and else is another each time; the
@@ -396,6 +398,7 @@ void train(TrainArguments o)
     const bool learns = !fitted.empty() && o.faults.empty();  // delays that were asked for are not the machine's
     const auto next = learns ? session::learnFrom(session::machineCache(), model.scene, result.timing) : std::string();
     const Conclusion conclusion = training.conclude(info, result, record);
+    o.room.reset();
     const auto written = writeOutputs(o, info, model, viewers, took, conclusion, result);
     if (o.json != "-" && !o.tryout) {
         summarise(result, info, model, next);

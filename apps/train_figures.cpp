@@ -1,5 +1,7 @@
 #include <apps/train_figures.h>
 
+#include <base/error.h>
+#include <base/room.h>
 #include <haptics/measures.h>
 #include <haptics/posed.h>
 #include <haptics/score.h>
@@ -74,6 +76,17 @@ nlohmann::json askedFor(const Conclusion& conclusion, const haptics::Score& scor
 }
 
 }  // namespace
+
+std::shared_ptr<base::Descriptor> roomForFigures(const std::filesystem::path& json)
+{
+    constexpr std::size_t enough = 64 << 10;  // [bytes]
+    if (json.empty() || json == "-") {
+        return nullptr;
+    }
+    const auto folder = std::filesystem::absolute(json).parent_path();
+    base::failIf(!base::hasRoom(folder, enough), "{}: the disk is full: make room, then start again", json.native());
+    return std::make_shared<base::Descriptor>(base::keepRoom(folder, enough));
+}
 
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
                          const haptics::SessionModel& model, const Conclusion& conclusion)

@@ -456,7 +456,7 @@ void Errands::list(State& state)
         impl_->listPeople(state);
         impl_->listCurricula(state);
         impl_->choosePerson(state);
-        const std::string why = whyNoSessions(impl_->sink.folder());
+        const std::string why = whyNoSessions(impl_->sink.folder()) + littleRoom(impl_->sink.folder());
         state.notice += (state.notice.empty() || why.empty() ? "" : "\n") + why;
     } catch (const std::exception& e) {
         state.notice = e.what();

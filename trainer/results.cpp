@@ -288,6 +288,17 @@ std::string whyNoSessions(const fs::path& folder)
                       folder.string());
 }
 
+std::string littleRoom(const fs::path& folder, std::uintmax_t least)
+{
+    std::error_code none;
+    const auto space = fs::space(folder, none);
+    constexpr double mega = 1e6;
+    return none || space.available >= least || !canBeWritten(folder)
+               ? ""
+               : said(tr("{}: the disk is nearly full ({:.1Lf} MB free). A session that fills it is not kept: make room."),
+                      folder.string(), static_cast<double>(space.available) / mega);
+}
+
 std::string whyNoProfiles()
 {
     const fs::path folder = base::userFolder(base::UserFolder::data);

@@ -2,6 +2,7 @@
 
 #include <trainer/state.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -53,6 +54,9 @@ private:
 std::string whyNoSessions(const std::filesystem::path& folder);
 /// The same of profiles, which are in base::UserFolder::data.
 std::string whyNoProfiles();
+/// That the disk of this folder is nearly full, and what to do, in words; empty: it is not.
+/// @param least  free bytes that are enough: a minute is 15 MB in the record and as much in its log
+std::string littleRoom(const std::filesystem::path& folder, std::uintmax_t least = 100'000'000);
 /// Where `palpate profile` keeps them.
 std::filesystem::path profilesFile();
 

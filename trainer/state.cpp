@@ -3,6 +3,7 @@
 #include <base/said.h>
 #include <base/shell_word.h>
 #include <base/user_files.h>
+#include <trainer/results.h>
 
 #include <fmt/format.h>
 
@@ -355,7 +356,7 @@ void sessionStarted(State& state, SessionFiles files, std::string command)
     state.files = std::move(files);
     state.command = std::move(command);
     state.result = {};
-    state.notice.clear();
+    state.notice = littleRoom(state.files.record.parent_path());
     state.told.clear();
     state.running = true;
     state.leaving = false;

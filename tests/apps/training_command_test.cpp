@@ -1,8 +1,10 @@
+#include <base/room.h>
 #include <tests/apps/program.h>
 
 #include <gtest/gtest.h>
 
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -220,6 +222,29 @@ TEST_F(TrainingCommands, ASessionThatIsToldThatItIsDoneIsKept)
     const Outcome done = running.wait();
     EXPECT_EQ(done.status, 0) << done.err;
     EXPECT_NE(done.out.find("kept for anna as session 1"), std::string::npos) << done.out << done.err;
+}
+
+// A record that fills the disk takes no room from the figures: a file without a name keeps it.
+TEST_F(TrainingCommands, WhileASessionRunsThereIsRoomForItsFigures)
+{
+    constexpr std::uintmax_t enough = 64 << 10;                                  // [bytes]
+    const bool can = static_cast<bool>(base::keepRoom(folder_.path(), enough));  // not on every file system
+    Program running("palpate", {"train", smallLayered(), "--headless", "--setting", "fast", "--record", folder_ / "s.db",
+                                "--json", folder_ / "s.json"});
+    ASSERT_TRUE(catches(running, SIGUSR1));
+    std::uintmax_t kept = 0;
+    for (const auto& open : fs::directory_iterator("/proc/" + std::to_string(running.pid()) + "/fd")) {
+        std::error_code none;
+        const fs::path file = fs::read_symlink(open, none);
+        struct stat its {};
+        if (file.parent_path() == folder_.path() && ::stat(open.path().c_str(), &its) == 0 && its.st_nlink == 0) {
+            kept += 512 * static_cast<std::uintmax_t>(its.st_blocks);
+        }
+    }
+    EXPECT_GE(kept, can ? enough : 0);
+    running.send(SIGUSR1);
+    EXPECT_EQ(running.wait().status, 0);
+    EXPECT_GT(fs::file_size(folder_ / "s.json"), 1000U);
 }
 
 // Nobody can score or replay again what the profile would then claim.

@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <fstream>
+#include <limits>
 #include <string>
 
 namespace palpate::trainer {
@@ -144,6 +146,16 @@ TEST(Results, TheBestOfACaseIsThatOfItsOwnFiles)
           "{\"score\": {\"total\": 99, \"points\": {\"core\": 1, \"vital\": 1, \"technique\": 1}}}");
     EXPECT_EQ(sink.best(layered), 71.5);
     EXPECT_EQ(sink.best(other), 99);
+}
+
+TEST(Results, ADiskThatIsNearlyFullIsSaidBeforeTheSession)
+{
+    const Folder folder;
+    EXPECT_EQ(littleRoom(folder / "none"), "") << "nothing is known of it";
+    EXPECT_EQ(littleRoom(folder.path(), 0), "");
+    const std::string told = littleRoom(folder.path(), std::numeric_limits<std::uintmax_t>::max());
+    EXPECT_NE(told.find(folder.path().string() + ": the disk is nearly full ("), std::string::npos) << told;
+    EXPECT_EQ(whyNoSessions(folder.path()), "") << "it can be tried";
 }
 
 // A file is in the way: that stops root as well.
