@@ -20,7 +20,7 @@ constexpr double minStiffness = 0.1;  // of a direction, in what is expected alo
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
 // Of a step, in directions; usual are 0.4 to 1.5. Where tissue gives way to next to nothing along one, the contacts would
 // be thrown off with it.
-constexpr double longest = 2.0;
+constexpr double longest = 1.4;
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.

@@ -166,37 +166,7 @@ Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     }
 }
 
-namespace {
-
-// Whether the coarser level has neither tissue nor held nodes outside of the window at node n, on its border.
-bool isAirBeyond(Index3 n, const Window& w, const CellLevel& coarser) noexcept
-{
-    const Index3 at = w.low + n, end = coarser.nodes.size - 1;
-    const auto isAir = [&](Index3 cell) {
-        bool any = coarser.mu[coarser.nodes.offset(cell)] > 0.0F;
-        volume::forEachIndex(cell, cell + 1,
-                             [&](Index3 node) { any = any || coarser.fixed[coarser.nodes.offset(node)] != 0; });
-        return !any;
-    };
-    bool air = true;
-    for (int axis = 0; axis < 3; ++axis) {
-        Index3 first = (at - 1) / 2, last = at / 2;  // its cells
-        if (n[axis] == 0) {
-            last[axis] = first[axis] = at[axis] / 2 - 1;
-        } else if (n[axis] == w.box[axis] - 1) {
-            first[axis] = last[axis];
-        } else {
-            continue;
-        }
-        volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, end - 1),
-                             [&](Index3 cell) { air = air && isAir(cell); });
-    }
-    return air;
-}
-
-}  // namespace
-
-void Window::place(const CellLevel& level, Index3 at, const CellLevel* coarser) noexcept
+void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
 {
     low = at;
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
@@ -219,22 +189,18 @@ void Window::place(const CellLevel& level, Index3 at, const CellLevel* coarser) 
         placeTerm(level, i);
     }
     placeNodes(level);
-    if (coarser != nullptr) {
-        placeBorder(*coarser);
-    }
-    placeFragments(level, coarser == nullptr);
+    placeBorder(coarsest);
+    placeFragments(level, coarsest);
     cuts.classify(mu, stiffening);
 }
 
-// Nodes over the surface with nothing but air beyond them stay free: the coarser window has no tissue there that has to
-// fit.
-void Window::placeBorder(const CellLevel& coarser) noexcept
+void Window::placeBorder(bool coarsest) noexcept
 {
+    if (coarsest) {
+        return;
+    }
     const auto follow = [&](Index3 n) {
         const std::size_t node = layout.at(n.x, n.y, n.z);
-        if (dof[node] > 0.0F && isAirBeyond(n, *this, coarser)) {
-            return;
-        }
         border[node] = open[node];
         diagonal[node] = dof[node] = 0.0F;
     };

@@ -210,9 +210,8 @@ struct Window {
     /// Nodes that it has room for.
     std::size_t room() const noexcept { return mu.size() - Layout::lanes; }
 
-    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarser`: the next coarser level; without one
-    /// the window has no border.
-    void place(const CellLevel& level, Index3 at, const CellLevel* coarser) noexcept;
+    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
+    void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
     void cover(const CellLevel& level, const Window& finer) noexcept;
 
@@ -221,7 +220,7 @@ private:
     {
         return {shear.data(), lame.data(), stiffening.data(), thin, cuts.view(), cuts.filling(), relief};
     }
-    void placeBorder(const CellLevel& coarser) noexcept;
+    void placeBorder(bool coarsest) noexcept;
     void pullByFragments(const Window& finer) noexcept;
     void coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept;
     void placeNodes(const CellLevel& level) noexcept;

@@ -108,7 +108,7 @@ void WindowStack::place() noexcept
         Window& w = windows_[l];
         const bool moves = w.low != low_[l];
         if (moves || finerMoves) {
-            w.place(body_->levels[l], low_[l], l + 1 < windows_.size() ? &body_->levels[l + 1] : nullptr);
+            w.place(body_->levels[l], low_[l], l + 1 == windows_.size());
             if (l > 0) {
                 w.cover(body_->levels[l], windows_[l - 1]);
             }

@@ -234,8 +234,8 @@ json SweepFolder::checkFiles()
 
 void SweepFolder::checkInputs(const json& about) const
 {
-    const json then = about.value("inputs", json::object());
-    for (const auto& [file, hash] : inputsOf(plan_.base).items()) {
+    const json then = about.value("inputs", json::object()), now = inputsOf(plan_.base);
+    for (const auto& [file, hash] : now.items()) {
         base::failIf(
             !then.is_object() || then.value(file, json()) != hash,
             "{}: {}, which its scene reads, has changed since the sweep began: bring it back, or begin in another folder",
