@@ -18,9 +18,6 @@ constexpr int maxFromAbove = 2;       // the same, where the increment may have 
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
-// Of a step, in directions; usual are 0.4 to 1.5. Where tissue gives way to next to nothing along one, the contacts would
-// be thrown off with it.
-constexpr double longest = 1.4;
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
@@ -176,8 +173,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         gone = length;
         const auto now = tissueForce(Field::f, to.field);
         const Parabola tissue{to.tissue.slope, (-now.product - to.tissue.slope) / gone};
-        const double lowest = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
-        const double best = std::clamp(lowest, -longest, longest);
+        const double best = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
         const double further = std::max(1.0, std::abs(best / gone));
         const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;
         const bool isNear = further <= reach_.further && off <= reach_.off * std::abs(steepness * best);

@@ -177,21 +177,6 @@ TEST(PressDeep, TheWayOutHasTheForceOfTheWayInAndNoneThatPulls)
     }
 }
 
-// On the way out next to nothing holds some nodes over the skin, and one cycle went along them by 23 times its direction:
-// single ticks lost up to two thirds of the force.
-TEST(PressDeep, LayersUnderSkinLetGoWithoutAJump)
-{
-    const auto model = haptics::buildModel(*datasets::builtInScene("layered"), false);
-    const Pressed p = pressed(model, inAndOut(Vec3(-10e-3, 0, 0.3e-3), Vec3(0, 1, 0), 10e-3, 10e-3), tenBall);
-    double jump = 0.0;
-    for (std::size_t i = 2; i < p.samples.size(); ++i) {
-        const Vec3 beside = 0.5 * (p.samples[i - 2].force + p.samples[i].force);
-        jump = std::max(jump, glm::distance(p.samples[i - 1].force, beside));
-    }
-    EXPECT_LT(jump, 0.03 * p.summary.peakForce);
-    EXPECT_LE(inwardForce(p), 1e-6);
-}
-
 // Deeper than the shelf is thick: past its middle the nearest surface is that on its other side.
 TEST(PressDeep, AToolPressedThroughAThinPartKeepsItsSide)
 {
