@@ -74,8 +74,10 @@ void removeRecord(const fs::path& file, Erased& erased)
         removeFilms(file, erased);
     }
     removeOne(file, erased);
-    // A film that came to its end meanwhile; its writer looks for the record after that, and removes a later one itself.
-    closed ? removeFilms(file, erased) : void();
+    if (closed) {
+        // One that came to its end meanwhile; its writer looks for the record after that, and removes a later one itself.
+        removeFilms(file, erased);
+    }
 }
 
 // A film that is being made ("X.mp4.part", in the window "X.part.mp4.part") goes with the record beside it, or stays with

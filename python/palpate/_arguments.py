@@ -29,6 +29,14 @@ def path_of(value, name):
         raise TypeError(f"{name}: give the name of a file or a folder, not {said(value)}") from None
 
 
+def whole(value, asked):
+    """A whole number. Raises TypeError that begins with `asked`: the argument, and what it has to be."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{asked}, not {said(value)}") from None
+
+
 class ClassSignature:
     """The __signature__ of a class of the C++ side, which inspect.signature() does not find in its __init__."""
 

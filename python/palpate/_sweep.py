@@ -4,7 +4,6 @@ import collections.abc
 import csv
 import inspect
 import json
-import operator
 import os
 import pathlib
 import re
@@ -14,7 +13,7 @@ import sys
 import tempfile
 
 from . import _palpate
-from ._arguments import path_of, said
+from ._arguments import path_of, said, whole
 from ._errors import Error
 from ._toml import dumps
 
@@ -136,10 +135,7 @@ def _number(text):
 def _jobs(jobs):
     if jobs is None:
         return os.cpu_count() or 1
-    try:
-        number = operator.index(jobs)
-    except TypeError:
-        raise TypeError(f"sweep: jobs: give a whole number, not {said(jobs)}") from None
+    number = whole(jobs, "sweep: jobs: give a whole number")
     if number < 1:
         raise ValueError(f"sweep: jobs: give 1 or more, not {number}")
     return number

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import operator
 import os
 import sys
 from collections.abc import Callable
@@ -21,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _palpate
-from ._arguments import said
+from ._arguments import said, whole
 from ._errors import Error
 from ._palpate import Model, Scene, Session, Volume
 
@@ -283,10 +282,7 @@ def _seed(value):
     """A seed of random numbers, or None. Raises TypeError or ValueError that names it."""
     if value is None:
         return None
-    try:
-        seed = operator.index(value)
-    except TypeError:
-        raise TypeError(f"seed: has to be a whole number, or None, not {said(value)}") from None
+    seed = whole(value, "seed: has to be a whole number, or None")
     if seed < 0:
         raise ValueError(f"seed: has to be 0 or more, not {seed}")
     return seed
@@ -294,10 +290,7 @@ def _seed(value):
 
 def _count(value, name):
     """A whole number above 0. Raises TypeError or ValueError that names it."""
-    try:
-        count = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name}: has to be a whole number, not {said(value)}") from None
+    count = whole(value, f"{name}: has to be a whole number")
     if isinstance(value, (bool, np.bool_)) or count < 1:
         raise ValueError(f"{name}: has to be 1 or more, not {value!r}")
     return count
