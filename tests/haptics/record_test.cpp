@@ -414,7 +414,7 @@ TEST(Record, RefusesWhatIsNoRecordOnOneLine)
         expectOneLineAbout(file, words, tests::errorOf([&] { synthetic::read(Record(file)); }));
     };
     refuse(folder / "none", "no such file");
-    refuse(folder.path(), "is not a file");
+    refuse(folder.path(), "is a folder, not a file: name a file in it; give the record of a session");
     std::ofstream(folder / "text") << std::string(5000, 'x');
     refuse(folder / "text", "is not a session record");
     std::ofstream(folder / "empty").close();
