@@ -166,7 +166,36 @@ Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     }
 }
 
-void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
+namespace {
+
+// Whether the coarser level has no tissue outside of the window at node n, on its border, and does not hold it either.
+bool isAirBeyond(Index3 n, const Window& w, const CellLevel& coarser) noexcept
+{
+    const Index3 at = w.low + n, end = coarser.nodes.size - 1;
+    bool air = true;
+    volume::forEachIndex(at / 2, at / 2 + at % 2,
+                         [&](Index3 parent) { air = air && coarser.fixed[coarser.nodes.offset(parent)] == 0; });
+    const auto look = [&](Index3 cell) {
+        air = air && coarser.mu[coarser.nodes.offset(cell)] == 0.0F &&
+              coarser.fragments.in(cell, coarser.nodes.size.y).empty();
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+        Index3 first = (at - 1) / 2, last = at / 2;  // of the cells around it
+        if (n[axis] == 0) {
+            first[axis] = last[axis] = at[axis] / 2 - 1;
+        } else if (n[axis] == w.box[axis] - 1) {
+            first[axis] = last[axis];
+        } else {
+            continue;
+        }
+        volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, end - 1), look);
+    }
+    return air;
+}
+
+}  // namespace
+
+void Window::place(const CellLevel& level, Index3 at, const CellLevel* coarser, bool freeInAir) noexcept
 {
     low = at;
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
@@ -189,20 +218,24 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
         placeTerm(level, i);
     }
     placeNodes(level);
-    placeBorder(coarsest);
-    placeFragments(level, coarsest);
+    if (coarser != nullptr) {
+        placeBorder(*coarser, freeInAir);
+    }
+    placeFragments(level, coarser == nullptr);
     cuts.classify(mu, stiffening);
 }
 
-void Window::placeBorder(bool coarsest) noexcept
+// Nodes over the surface with nothing but air beyond them stay free: the coarser window has no tissue there that has to
+// fit.
+void Window::placeBorder(const CellLevel& coarser, bool freeInAir) noexcept
 {
-    if (coarsest) {
-        return;
-    }
     const auto follow = [&](Index3 n) {
         const std::size_t node = layout.at(n.x, n.y, n.z);
+        if (freeInAir && diagonal[node] > 0.0F && isAirBeyond(n, *this, coarser)) {
+            return;
+        }
         border[node] = open[node];
-        diagonal[node] = dof[node] = 0.0F;
+        diagonal[node] = 0.0F;
     };
     const Index3 last = size() - 1;
     for (int axis = 0; axis < 3; ++axis) {
@@ -228,7 +261,6 @@ void Window::placeNodes(const CellLevel& level) noexcept
                 open[to + i] = isHeld ? 0.0F : 1.0F;
                 tissue[to + i] = sum > 0.0F ? 1.0F : 0.0F;
                 diagonal[to + i] = isFree ? 1.0F / sum : 0.0F;
-                dof[to + i] = isFree ? 1.0F : 0.0F;
             }
         }
     }
@@ -288,7 +320,6 @@ void Window::placeFragments(const CellLevel& level, bool coarsest) noexcept
         open[v.at] = node.isFixed ? 0.0F : 1.0F;
         tissue[v.at] = 1.0F;
         border[v.at] = follows ? open[v.at] : 0.0F;
-        dof[v.at] = isFree && !follows ? 1.0F : 0.0F;
         diagonal[v.at] = isFree && !follows ? 1.0F / node.diagonal : 0.0F;
     }
     for (const WindowFragments::Copy& copy : fragments.copies()) {
@@ -323,12 +354,12 @@ void Window::keepWhole(const CellLevel& level, const CellFragment& f) noexcept
         if (open[node] > 0.0F && border[node] == 0.0F) {
             const float before = diagonal[node] > 0.0F ? 1.0F / diagonal[node] : 0.0F;
             diagonal[node] = 1.0F / (before + own);
-            dof[node] = tissue[node] = 1.0F;
+            tissue[node] = 1.0F;
         }
     }
 }
 
-void Window::cover(const CellLevel& level, const Window& finer) noexcept
+void Window::cover(const Window& finer) noexcept
 {
     const Index3 o = finer.offsetIn(*this);
     const Index3 cells = (finer.size() - 1) / 2;
@@ -341,50 +372,29 @@ void Window::cover(const CellLevel& level, const Window& finer) noexcept
             }
         }
     });
-    volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
-    coverFragments(level, o, cells);
-    // A node on the finer window's border may be left with nothing but empty cells around it.
-    const auto pulled = [&](Index3 n) {
-        if (anyTissue(uncoveredMu, n - 1, n)) {
-            return true;
-        }
-        bool any = false;
-        const Index3 fine = 2 * (n - o);
-        volume::forEachIndex(glm::max(fine - 1, Index3(0)), glm::min(fine + 1, finer.size() - 1), [&](Index3 m) {
-            any = any || (finer.border[finer.layout.at(m.x, m.y, m.z)] > 0.0F && finer.anyTissue(finer.mu, m - 1, m));
-        });
-        return any;
-    };
-    volume::forEachIndex(o, o + cells, [&](Index3 n) {
-        float& free = dof[layout.at(n.x, n.y, n.z)];
-        free = free > 0.0F && pulled(n) ? 1.0F : 0.0F;
-    });
-    pullByFragments(finer);
+    coverFragments(o, cells);
 }
 
-// Nodes on the finer window's border that fragments hold, which the masks of cells do not know.
-void Window::pullByFragments(const Window& finer) noexcept
+void Window::countTissue(float* around) const noexcept
 {
-    const Index3 first = finer.offsetIn(*this), last = first + (finer.size() - 1) / 2;
-    const auto pull = [&](Index3 cell) {
-        volume::forEachIndex(glm::max(cell, first), glm::min(cell + 1, last), [&](Index3 n) {
-            const std::size_t node = layout.at(n.x, n.y, n.z);
-            if (!isBetween(n, first + 1, last - 1)) {
-                dof[node] = diagonal[node] > 0.0F ? 1.0F : 0.0F;
-            }
-        });
-    };
-    for (const WindowFragments::Placed& p : fragments.placed()) {
-        if (uncoveredMu[p.node] > 0.0F) {
-            pull(p.cell - low);
+    std::fill_n(around, layout.count, 0.0F);
+    for (int c = 0; c < 8; ++c) {
+        const std::size_t corner = layout.corner(0, c);
+        for (std::size_t cell = 0; cell + corner < layout.count; ++cell) {
+            around[cell + corner] += uncoveredMu[cell] > 0.0F ? 1.0F : 0.0F;
         }
-    }
-    for (const WindowFragments::Placed& p : finer.fragments.placed()) {
-        pull(p.cell / 2 - low);
     }
 }
 
-void Window::coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept
+void Window::freeWhereHeld(float* held) noexcept
+{
+    for (std::size_t i = 0; i < layout.count; ++i) {
+        dof[i] = held[i] > 0.0F && diagonal[i] > 0.0F ? 1.0F : 0.0F;
+        held[i] = held[i] > 0.0F ? border[i] : 0.0F;
+    }
+}
+
+void Window::coverFragments(Index3 first, Index3 cells) noexcept
 {
     for (const WindowFragments::Placed& b : fragments.placed()) {
         const Index3 c = b.cell - low;
@@ -395,10 +405,6 @@ void Window::coverFragments(const CellLevel& level, Index3 first, Index3 cells) 
             terms[i].mu[b.node] *= left;
             terms[i].lambda[b.node] *= left;
         }
-    }
-    for (const WindowFragments::VirtualAt& v : fragments.virtuals()) {
-        const Index3 n = level.fragments.nodes[v.node].at - low;
-        dof[v.at] = isBetween(n, first + 1, first + cells - 1) ? 0.0F : dof[v.at];
     }
 }
 

@@ -130,7 +130,7 @@ struct Window {
     Floats diagonal;  // reciprocal of the operator's diagonal, zero where the node is not free
     Floats border;    // nodes that follow the next coarser window
     Floats open;      // free, or border
-    Floats dof;       // degrees of freedom: free and not covered
+    Floats dof;       // degrees of freedom: free, and held by tissue that is not covered
     Floats tissue;    // nodes of a cell with tissue
     WindowFragments fragments;
     std::array<Floats, fieldCount> fields;
@@ -210,19 +210,24 @@ struct Window {
     /// Nodes that it has room for.
     std::size_t room() const noexcept { return mu.size() - Layout::lanes; }
 
-    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
-    void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;
+    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarser`: the next coarser level; without
+    /// one the window has no border. `freeInAir`: no border either where there is nothing but air beyond.
+    void place(const CellLevel& level, Index3 at, const CellLevel* coarser, bool freeInAir) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
-    void cover(const CellLevel& level, const Window& finer) noexcept;
+    void cover(const Window& finer) noexcept;
+    /// How many cells with tissue that no finer window covers are around each node. Copies keep what is theirs.
+    void countTissue(float* around) const noexcept;
+    /// Makes degrees of freedom of the free nodes where `held` is not zero, which is then 1 where the border is held, else
+    /// 0.
+    void freeWhereHeld(float* held) noexcept;
 
 private:
     CellStiffness stiffnessOf(const Floats& shear, const Floats& lame, const CellLayers& thin) const noexcept
     {
         return {shear.data(), lame.data(), stiffening.data(), thin, cuts.view(), cuts.filling(), relief};
     }
-    void placeBorder(bool coarsest) noexcept;
-    void pullByFragments(const Window& finer) noexcept;
-    void coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept;
+    void placeBorder(const CellLevel& coarser, bool freeInAir) noexcept;
+    void coverFragments(Index3 first, Index3 cells) noexcept;
     void placeNodes(const CellLevel& level) noexcept;
     void placeFragments(const CellLevel& level, bool coarsest) noexcept;
     void keepWhole(const CellLevel& level, const CellFragment& fragment) noexcept;

@@ -15,6 +15,10 @@ namespace {
 // stay nodes, and a hand that trembles between two places should not move it.
 constexpr double slack = 1.3;
 
+// The first window whose border is free where nothing but air is beyond it. On finer ones few cycles come nearer to the
+// force with a border that follows.
+constexpr std::size_t firstFreeInAir = 2;
+
 constexpr std::array displacements{Field::u, Field::d};
 
 // A window is as deep as asked for and half as wide again: what a tool moves spreads along the surface. Along x it is as
@@ -108,9 +112,10 @@ void WindowStack::place() noexcept
         Window& w = windows_[l];
         const bool moves = w.low != low_[l];
         if (moves || finerMoves) {
-            w.place(body_->levels[l], low_[l], l + 1 == windows_.size());
+            const CellLevel* coarser = l + 1 < windows_.size() ? &body_->levels[l + 1] : nullptr;
+            w.place(body_->levels[l], low_[l], coarser, l >= firstFreeInAir);
             if (l > 0) {
-                w.cover(body_->levels[l], windows_[l - 1]);
+                w.cover(windows_[l - 1]);
             }
         }
         finerMoves = moves;
@@ -119,6 +124,25 @@ void WindowStack::place() noexcept
         const Window& coarse = windows_[l + 1];
         windows_[l].fragments.link(body_->levels[l], windows_[l].low, coarse.layout, coarse.low, body_->levels[l + 1],
                                    coarse.fragments);
+    }
+    findFreedom();
+}
+
+// A node is held by the cells around it that no finer window covers, and by what follows it on the next finer window's
+// border, if that is held itself: over the surface borders lie over each other, and there may be no such cell in any of
+// them. Without being held a node is no degree of freedom: contacts would carry it away. Marks are whole numbers, which are
+// exact in whatever order they are added.
+void WindowStack::findFreedom() noexcept
+{
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        Window& w = windows_[l];
+        std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
+        w.countTissue(w.field(Field::t));
+        w.collect(Field::t);
+        if (l > 0) {
+            restrictAdd(*kernels_, windows_[l - 1], windows_[l - 1].field(Field::t), w, w.field(Field::t), scratch());
+        }
+        w.freeWhereHeld(w.field(Field::t));
     }
 }
 

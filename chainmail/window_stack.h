@@ -103,6 +103,7 @@ private:
     Vec3 wantedPlace(std::size_t level, const Focus& focus) const noexcept;
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
+    void findFreedom() noexcept;
     void addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept;
     void dropFields(bool carry) noexcept;
     void transfer(Field field) noexcept;

@@ -229,7 +229,7 @@ TEST(CutCells, EveryLevelBendsAsThePlate)
         for (std::size_t l = 0; l < 3; ++l) {
             const CellLevel& level = body.levels.at(l);
             Window w(level, level.nodes.size, false);
-            w.place(level, Index3(0), true);
+            w.place(level, Index3(0), nullptr, false);
             volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
                 const Vec3 p = level.nodes.position(n) - Vec3(16.0 * h, middle, 0.0);
                 w.set(Field::u, w.layout.at(n.x, n.y, n.z), curvature * Vec3(p.x * p.y, -0.5 * p.x * p.x, 0.0));
