@@ -1,5 +1,5 @@
 // Gaps that are narrower than the cells of the wider windows.
-#include "elastic_bodies.h"
+#include "gap_bodies.h"
 
 #include <chainmail/split_level.h>
 #include <tests/allocations.h>
@@ -14,24 +14,12 @@
 namespace palpate::chainmail {
 namespace {
 
-constexpr double cellSize = 2e-3, fatModulus = 5e3;
-
-// Two fingers, 16 x 16 mm and `length` cells long, side by side along x, `gap` cells between them, on a palm that is held;
-// or only the second of them on the same palm. Their free ends are at z = 0. Without a palm each ends in bone of its own.
-ElasticBody fingers(int gap, bool both, int length = 24, bool relaxes = false, int palm = 4)
-{
-    constexpr int width = 8;
-    const Index3 cells(2 * width + gap, width, length + palm);
-    const auto material = [=](Index3 c) {
-        const bool isPalm = c.z >= length, isGap = c.x >= width && c.x < width + gap;
-        const bool isAir =
-            palm > 0 ? !isPalm && c.x < width + gap && (!both || c.x >= width) : isGap || (!both && c.x < width);
-        auto tissue = isAir ? volume::CellMaterial{} : tests::tissue(fatModulus, 0.45, c.z >= length + palm - 1);
-        tissue.relaxing = {0.3F, 0.2F};
-        return tissue;
-    };
-    return tests::bodyOf({cells, cellSize, material, 4, Vec3(0.0)}, 0.4999, relaxes);
-}
+using tests::brush;
+using tests::cellSize;
+using tests::fatModulus;
+using tests::fingers;
+using tests::foam;
+using tests::randomiseAll;
 
 ElasticTool fingerBall(Vec3 centre)
 {
@@ -147,40 +135,6 @@ TEST(ElasticFragments, WindowsMoveAlongAGap)
     }
 }
 
-// Foam of walls and holes of some cells, held at one end.
-ElasticBody foam(unsigned seed, double filled)
-{
-    constexpr Index3 cells(30, 26, 34), wide(3);
-    const volume::NodeGrid noise{cells / wide + 2, Vec3(0.0), 1.0};
-    std::minstd_rand random(seed);
-    std::uniform_real_distribution<double> value(0.0, 1.0);
-    std::vector<double> values(noise.count());
-    for (double& one : values) {
-        one = value(random);
-    }
-    const auto material = [=](Index3 c) {
-        const auto share = trilinear(Vec3(c % wide) / Vec3(wide));
-        double sum = 0.0;
-        for (int i = 0; i < 8; ++i) {
-            const std::size_t at = noise.offset(c / wide + Index3(i & 1, i >> 1 & 1, i >> 2));
-            sum += static_cast<double>(share[static_cast<std::size_t>(i)]) * values[at];
-        }
-        const bool isHeld = c.z == cells.z - 1;
-        return isHeld || sum < filled ? tests::tissue(fatModulus, 0.45, isHeld) : volume::CellMaterial{};
-    };
-    return tests::bodyOf({cells, cellSize, material, 2, Vec3(0.0)});
-}
-
-// Bristles of one cell on a plate.
-ElasticBody brush()
-{
-    const auto material = [](Index3 c) {
-        const bool is = c.z >= 16 || (c.x % 2 == 0 && c.y % 2 == 0);
-        return is ? tests::tissue(fatModulus, 0.45, c.z == 19) : volume::CellMaterial{};
-    };
-    return tests::bodyOf({{41, 41, 20}, cellSize, material, 2, Vec3(0.0)});
-}
-
 std::size_t fragmentsOf(const ElasticBody& body)
 {
     std::size_t sum = 0;
@@ -275,19 +229,6 @@ TEST(ElasticFragments, LooseTissueStaysWithWhatIsNear)
         return c.y == 9 && !isBridge ? volume::CellMaterial{} : tests::tissue(fatModulus, 0.45, c.y == 15);
     };
     EXPECT_GT(fragmentsOf(tests::bodyOf(block)), 0U);
-}
-
-// Random at every degree of freedom, virtual nodes included; copies and borders follow.
-void randomiseAll(WindowStack& stack, Field field, std::minstd_rand& random)
-{
-    std::uniform_real_distribution<float> value(-1.0F, 1.0F);
-    for (Window& w : stack.windows()) {
-        for (std::size_t i = 0; i < 3 * w.layout.count; ++i) {
-            w.field(field)[i] = w.dof[i % w.layout.count] * value(random);
-        }
-        w.share(field);
-    }
-    stack.joinBorders(field);
 }
 
 // x . A y = A x . y, over all windows, fragments and links; and the multigrid's answer likewise.
@@ -423,65 +364,6 @@ TEST(ElasticFragments, FollowingKeepsTheDisplacement)
         }
     }
     EXPECT_GT(moves, 20);
-}
-
-// Whether a node moves, is fixed, or follows nodes of which that is true.
-bool isHandled(const WindowStack& stack, std::size_t level, std::size_t node)
-{
-    const Window& w = stack.windows()[level];
-    const std::size_t at = w.fragments.original(node);
-    bool handled = w.dof[at] != 0.0F || w.open[at] == 0.0F;
-    if (w.border[at] != 0.0F) {
-        handled = true;
-        w.visitParents(at, stack.windows()[level + 1],
-                       [&](std::size_t parent, double) { handled = handled && isHandled(stack, level + 1, parent); });
-    }
-    return handled;
-}
-
-// Of a window the corners of cells that count and are left out.
-int leftOut(const WindowStack& stack, std::size_t level)
-{
-    const Window& w = stack.windows()[level];
-    int sum = 0;
-    for (std::size_t cell = 0; cell < w.layout.count; ++cell) {
-        for (int c = 0; c < 8 && w.uncoveredMu[cell] > 0.0F; ++c) {
-            sum += isHandled(stack, level, w.layout.corner(cell, c)) ? 0 : 1;
-        }
-    }
-    return sum;
-}
-
-// Of a window the degrees of freedom at which random displacements leave no force at all.
-int looseIn(WindowStack& stack, std::size_t level, std::minstd_rand& random)
-{
-    randomiseAll(stack, Field::p, random);
-    stack.apply(Field::p, Field::q);
-    const Window& w = stack[level];
-    int sum = 0;
-    for (std::size_t i = 0; i < w.layout.count; ++i) {
-        sum += w.dof[i] != 0.0F && w.value(Field::q, i) == Vec3(0.0) ? 1 : 0;
-    }
-    return sum;
-}
-
-// Every corner of a cell that counts moves, is fixed, or follows what does: also where a window has more fragments than
-// room for them. And what moves has such a corner.
-TEST(ElasticFragments, NoNodeOfTissueIsLeftOutAndNoOtherMoves)
-{
-    std::size_t withoutRoom = 0;
-    std::minstd_rand random(3);
-    for (const ElasticBody& body : {fingers(1, true, 64), fingers(3, true, 64), foam(7, 0.45), foam(9, 0.5), brush()}) {
-        for (double z = 8e-3; z < 0.13; z += 7e-3) {
-            WindowStack stack(body, 9, tests::focusUnder({26e-3, 0.0, z}));
-            for (std::size_t l = 0; l < stack.size(); ++l) {
-                withoutRoom += stack[l].fragments.left().size();
-                EXPECT_EQ(leftOut(stack, l), 0) << l << ", z " << z;
-                EXPECT_EQ(looseIn(stack, l, random), 0) << l << ", z " << z;
-            }
-        }
-    }
-    EXPECT_GT(withoutRoom, 0U);
 }
 
 // A place in a fragment without room moves with the cell itself.

@@ -203,55 +203,6 @@ TEST(ElasticWindows, CyclesGrowSlowlyWithTheNumberOfLevels)
     }
 }
 
-// Degrees of freedom at which random displacements leave no force at all: nothing holds them.
-int looseIn(WindowStack& stack, std::minstd_rand& random)
-{
-    tests::setField(stack, Field::p, [&](Vec3) {
-        return Vec3(0.1 + static_cast<double>(random() % 1000), static_cast<double>(random() % 1000), 1.0);
-    });
-    stack.joinBorders(Field::p);
-    stack.apply(Field::p, Field::q);
-    int loose = 0;
-    tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3) {
-        loose += w.dof[node] != 0.0F && tests::valueAt(w, node, Field::q) == Vec3(0.0) ? 1 : 0;
-    });
-    return loose;
-}
-
-// A node whose cells are all empty, or covered by a finer window, is no degree of freedom: contacts would carry it away.
-TEST(ElasticWindows, EveryDegreeOfFreedomHasStiffness)
-{
-    std::minstd_rand random(6);
-    const ElasticBody body = tests::bodyOf(tests::heldBlock({40, 30, 36}, spacing, modulus, 0.45));
-    for (const double y : {-4e-3, 0.0, 2e-3, 5e-3, 9e-3}) {
-        WindowStack stack(body, 11, tests::focusAt({0.02, y, 0.02}));
-        EXPECT_EQ(looseIn(stack, random), 0) << "focus at y " << y;
-    }
-}
-
-// Nor is one over the surface on which only nodes of finer windows hang whose own cells are covered: windows' borders lie
-// over each other there, up to the third.
-TEST(ElasticWindows, EveryDegreeOfFreedomHasStiffnessThroughAllWindows)
-{
-    std::minstd_rand random(7);
-    const auto upTo = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most + 1)); };
-    for (int i = 0; i < 60; ++i) {
-        tests::ElasticBlock block = tests::heldBlock({30 + upTo(40), 2 + upTo(30), 30 + upTo(40)}, spacing, modulus, 0.45);
-        block.air = 1 + upTo(12);
-        const ElasticBody body = tests::bodyOf(block);
-        const int window = 9 + 2 * upTo(4);
-        const Vec3 start = spacing * Vec3(upTo(block.cells.x), upTo(6) - 3, upTo(block.cells.z));
-        WindowStack stack(body, window, i % 2 == 0 ? tests::focusAt(start) : tests::focusUnder(start));
-        for (int move = 0; move < 4; ++move) {
-            EXPECT_EQ(looseIn(stack, random), 0)
-                << "block " << block.cells.x << " x " << block.cells.y << " x " << block.cells.z << ", air " << block.air
-                << ", window " << window << ", move " << move;
-            const Vec3 next = start + spacing * Vec3(upTo(10) - 5, upTo(4) - 2, upTo(10) - 5);
-            stack.follow(i % 2 == 0 ? tests::focusAt(next) : tests::focusUnder(next), false);
-        }
-    }
-}
-
 // Where old and new windows overlap, the finest has what it had, to the bit.
 TEST(ElasticWindows, FollowingKeepsTheDisplacement)
 {
