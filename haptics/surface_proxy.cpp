@@ -15,6 +15,7 @@ constexpr int slipSteps = 8;
 constexpr double axisStep = 1e-3;       // along the segment, where its deepest place is looked for [m]
 constexpr double asDeep = 0.25e-3;      // places less high over the deepest count, by how much less [m]
 constexpr int mostSteps = 512;          // along the segment
+constexpr double otherSide = -0.5;      // cosine between normals, under which a place lies across a gap that the tool fills
 constexpr double steepestField = 1.75;  // of a distance between its samples: sqrt(3), where each edge of a cell has slope 1
 
 DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept
@@ -54,19 +55,40 @@ DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool&
 
 SurfaceProxy touching(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept
 {
+    DeepestPlace place = deepestPlace(surface, tool, front);
+    const Vec3 first = surface.normal(place.at);
+    Vec3 normal = first;
     for (int i = 0; i < 3; ++i) {
-        const DeepestPlace place = deepestPlace(surface, tool, front);
-        front += (tool.radius - place.distance) * surface.normal(place.at);
+        front += (tool.radius - place.distance) * normal;
+        place = deepestPlace(surface, tool, front);
+        normal = surface.normal(place.at);
+        if (tool.radius > 0.0 && glm::dot(normal, first) < otherSide) {
+            return {front, first, place.at};
+        }
     }
-    const Vec3 place = deepestPlace(surface, tool, front).at;
-    return {front, surface.normal(place), place};
+    return {front, normal, place.at};
 }
+
+namespace {
+
+// The proxy moved by `way`, touching again. In a gap that is as narrow as the tool, or looks so between samples of the
+// distance, that may be the wall across it: then it goes along its own.
+SurfaceProxy moved(const volume::DistanceField& surface, const ProxyTool& tool, const SurfaceProxy& from, Vec3 way) noexcept
+{
+    const SurfaceProxy to = touching(surface, tool, from.front + way);
+    if (tool.radius > 0.0 && glm::dot(to.normal, from.normal) < otherSide) {
+        return {from.front + way, from.normal, from.place + way};
+    }
+    return to;
+}
+
+}  // namespace
 
 void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front, SurfaceProxy& proxy) noexcept
 {
     if (tool.length > 0.0) {
         // It may have turned.
-        proxy = touching(surface, tool, proxy.front);
+        proxy = moved(surface, tool, proxy, Vec3(0.0));
     }
     for (int i = 0; i < slipSteps; ++i) {
         const Vec3 away = front - proxy.front;
@@ -76,7 +98,7 @@ void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 fron
         if (excess <= 1e-9) {
             return;
         }
-        proxy = touching(surface, tool, proxy.front + std::min(excess, longestSlip) * glm::normalize(across));
+        proxy = moved(surface, tool, proxy, std::min(excess, longestSlip) * glm::normalize(across));
     }
 }
 

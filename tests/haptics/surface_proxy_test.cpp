@@ -63,5 +63,49 @@ TEST(SurfaceProxy, DeepestPlaceIsThatOfEveryPlace)
     }
 }
 
+// Distance to a block that is 50 mm wide and 40 mm deep, with a slit of 4 mm in its middle that is 20 mm deep.
+volume::DistanceField slitBlock(double spacing, Vec3 off)
+{
+    const auto box = [](Vec3 p, Vec3 low, Vec3 high) {
+        const Vec3 out = glm::max(low - p, p - high);
+        return glm::length(glm::max(out, Vec3(0.0))) + std::min(std::max({out.x, out.y, out.z}), 0.0);
+    };
+    volume::DistanceField field;
+    field.grid = {Index3(static_cast<int>(60e-3 / spacing)), Vec3(-30e-3, -15e-3, -30e-3) + off, spacing};
+    volume::forEachIndex(Index3(0), field.grid.size - 1, [&](Index3 n) {
+        const Vec3 p = field.grid.position(n);
+        const double body = box(p, Vec3(-25e-3, 0.0, -25e-3), Vec3(25e-3, 40e-3, 25e-3));
+        const double slit = box(p, Vec3(-2e-3, -1.0, -1.0), Vec3(2e-3, 20e-3, 1.0));
+        field.values.push_back(static_cast<float>(std::max(body, -slit)));
+    });
+    return field;
+}
+
+// A rod that nearly fills a slit, or does between samples of the distance, is led into one wall: its proxy stays on that
+// wall. It changed to the other in any tick, which ended the contact, and the next began with a proxy far away.
+TEST(SurfaceProxy, KeepsItsWallInASlitAsNarrowAsTheTool)
+{
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> unit(0.0, 1.0);
+    for (int i = 0; i < 60; ++i) {
+        const double spacing = (1.0 + unit(random)) * 1e-3;
+        const auto surface = slitBlock(spacing, spacing * Vec3(unit(random), unit(random), unit(random)));
+        const ProxyTool rod{(1.4 + 0.5 * unit(random)) * 1e-3, 25e-3, Vec3(0, 1, 0), 0.0};
+        const double side = i % 2 == 0 ? 1.0 : -1.0;
+        const Vec3 start(side * 0.7e-3, 14e-3, 0.0);
+        SurfaceProxy proxy = touching(surface, rod, start);
+        for (int step = 0; step <= 400; ++step) {
+            const Vec3 front = start + Vec3(side * 20e-6 * step, 0.0, 0.0);
+            slip(surface, rod, front, proxy);
+            if (depthUnder(proxy, front) <= 0.0) {
+                proxy = touching(surface, rod, front);
+            }
+            ASSERT_TRUE(step < 40 || -side * proxy.normal.x > 0.9) << i << ", step " << step;
+            ASSERT_LT(std::abs(proxy.front.x), 1.5e-3) << i << ", step " << step;
+        }
+        EXPECT_GT(depthUnder(proxy, start + Vec3(side * 8e-3, 0.0, 0.0)), 7e-3) << i;
+    }
+}
+
 }  // namespace
 }  // namespace palpate::haptics
