@@ -377,7 +377,6 @@ void Window::cover(const Window& finer) noexcept
 
 void Window::countTissue(float* around) const noexcept
 {
-    std::fill_n(around, layout.count, 0.0F);
     for (int c = 0; c < 8; ++c) {
         const std::size_t corner = layout.corner(0, c);
         for (std::size_t cell = 0; cell + corner < layout.count; ++cell) {

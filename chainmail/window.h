@@ -103,10 +103,10 @@ private:
 
 /// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
 ///
-///     +-----------------------------+      every node inside a window that no finer window covers is a degree of
-///     |           4 h               |      freedom; a node on a window's border takes what the next coarser window
-///     |    +----------------+       |      has there (trilinear), so that the displacement is continuous
-///     |    |     2 h        |       |
+///     +-----------------------------+      a node that tissue holds which no finer window covers is a degree of
+///     |           4 h               |      freedom, see WindowStack::findFreedom(); a node on a window's border takes
+///     |    +----------------+       |      what the next coarser window has there (trilinear), so that the displacement
+///     |    |     2 h        |       |      is continuous, but where a wider window has nothing but air beyond
 ///     |    |   +--------+   |       |
 ///     |    |   |  h     |   |       |
 ///     |    |   +--------+   |       |
@@ -210,12 +210,12 @@ struct Window {
     /// Nodes that it has room for.
     std::size_t room() const noexcept { return mu.size() - Layout::lanes; }
 
-    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarser`: the next coarser level; without
-    /// one the window has no border. `freeInAir`: no border either where there is nothing but air beyond.
+    /// Takes its cells' stiffness from the level, at `at`, and makes the masks but `dof`. `coarser`: the next coarser
+    /// level; without one the window has no border. `freeInAir`: no border either where there is nothing but air beyond.
     void place(const CellLevel& level, Index3 at, const CellLevel* coarser, bool freeInAir) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
     void cover(const Window& finer) noexcept;
-    /// How many cells with tissue that no finer window covers are around each node. Copies keep what is theirs.
+    /// Adds how many cells with tissue that no finer window covers are around each node. Copies keep what is theirs.
     void countTissue(float* around) const noexcept;
     /// Makes degrees of freedom of the free nodes where `held` is not zero, which is then 1 where the border is held, else
     /// 0.

@@ -130,8 +130,8 @@ void WindowStack::place() noexcept
 
 // A node is held by the cells around it that no finer window covers, and by what follows it on the next finer window's
 // border, if that is held itself: over the surface borders lie over each other, and there may be no such cell in any of
-// them. Without being held a node is no degree of freedom: contacts would carry it away. Marks are whole numbers, which are
-// exact in whatever order they are added.
+// them. Without being held a node is no degree of freedom: contacts would carry it away. Marks are counts and
+// eighths of 1, which are exact in whatever order they are added.
 void WindowStack::findFreedom() noexcept
 {
     for (std::size_t l = 0; l < windows_.size(); ++l) {

@@ -213,7 +213,7 @@ Vec3 continued(const Window& w, Field field, const float* holds, Index3 n) noexc
 
 // Nodes that hold no tissue in the fine window, but may in the coarse one, have no displacement of their own. Beside a gap
 // they keep what they have: a line would lead across it. Nothing is taken where the coarse window solves itself, as on the
-// fine one's border; what it holds is at rest.
+// fine one's border where that follows; what it holds is at rest.
 void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept
 {
     const bool hasGaps = !fine.fragments.placed().empty() || !coarse.fragments.placed().empty();

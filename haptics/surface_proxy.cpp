@@ -90,6 +90,7 @@ void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 fron
         // It may have turned.
         proxy = moved(surface, tool, proxy, Vec3(0.0));
     }
+    double longest = longestSlip;
     for (int i = 0; i < slipSteps; ++i) {
         const Vec3 away = front - proxy.front;
         const double depth = -glm::dot(away, proxy.normal);
@@ -98,7 +99,14 @@ void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 fron
         if (excess <= 1e-9) {
             return;
         }
-        proxy = moved(surface, tool, proxy, std::min(excess, longestSlip) * glm::normalize(across));
+        // Over an edge, or where two walls meet, a step may lead away from the tool.
+        const double step = std::min(excess, longest);
+        const SurfaceProxy next = moved(surface, tool, proxy, step * glm::normalize(across));
+        if (glm::distance(next.front, front) < glm::length(away)) {
+            proxy = next;
+        } else {
+            longest = 0.5 * step;
+        }
     }
 }
 

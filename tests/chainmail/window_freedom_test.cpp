@@ -76,10 +76,10 @@ TEST(WindowFreedom, NoNodeOfABlockIsLeftOutAndNoOtherMoves)
     std::minstd_rand random(7);
     const auto upTo = [&](int most) { return static_cast<int>(random() % static_cast<unsigned>(most + 1)); };
     for (int i = 0; i < 24; ++i) {
-        tests::ElasticBlock block = tests::heldBlock({30 + upTo(20), 2 + upTo(20), 30 + upTo(20)}, 1e-3, 1e4, 0.45);
+        tests::ElasticBlock block = tests::heldBlock({30 + upTo(45), 2 + upTo(20), 30 + upTo(45)}, 1e-3, 1e4, 0.45);
         block.air = 1 + upTo(7);
         const ElasticBody body = tests::bodyOf(block);
-        const Vec3 start = 1e-3 * Vec3(upTo(block.cells.x), upTo(12) - 4, upTo(block.cells.z));
+        const Vec3 start = 1e-3 * Vec3{upTo(block.cells.x), upTo(12) - 4, upTo(block.cells.z)};
         const auto focus = [&](Vec3 at) { return i % 2 == 0 ? tests::focusAt(at) : tests::focusUnder(at); };
         WindowStack stack(body, 9 + 2 * upTo(4), focus(start));
         for (int move = 0; move < 3; ++move) {
@@ -87,7 +87,7 @@ TEST(WindowFreedom, NoNodeOfABlockIsLeftOutAndNoOtherMoves)
                 EXPECT_EQ(leftOut(stack, l), 0) << i << ", level " << l << ", move " << move;
                 EXPECT_EQ(looseIn(stack, l, random), 0) << i << ", level " << l << ", move " << move;
             }
-            stack.follow(focus(start + 1e-3 * Vec3(upTo(10) - 5, upTo(4) - 2, upTo(10) - 5)), false);
+            stack.follow(focus(start + 1e-3 * Vec3{upTo(10) - 5, upTo(4) - 2, upTo(10) - 5}), false);
         }
     }
 }
