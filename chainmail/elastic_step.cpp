@@ -18,7 +18,7 @@ constexpr int maxFromAbove = 2;       // the same, where the increment may have 
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
-// A tick's further steps, in directions; usual are 0.4 to 1.4. Where tissue gives way to next to nothing along one (skin
+// A tick's steps, in directions; usual are 0.4 to 1.4. Where tissue gives way to next to nothing along one (skin
 // that is about to buckle), a longer one throws the contacts off for the sake of little energy.
 constexpr double longest = 1.5;
 constexpr double unbounded = std::numeric_limits<double>::infinity();
@@ -177,7 +177,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         gone = length;
         const auto now = tissueForce(Field::f, to.field);
         const Parabola tissue{to.tissue.slope, (-now.product - to.tissue.slope) / gone};
-        const double most = course_.effort.isTick && result.cycles > 1 ? longest : unbounded;
+        const double most = course_.effort.isTick ? longest : unbounded;
         const double best = std::clamp(lineSearch(slope, tissue.curvature, contacts, newtonSteps), -most, most);
         const double further = std::max(1.0, std::abs(best / gone));
         const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;

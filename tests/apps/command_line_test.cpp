@@ -114,7 +114,7 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
 // What is quoted may be anything: a message remains one line, and works no terminal.
 TEST(CommandLine, ANameOfSeveralLinesIsQuotedOnOne)
 {
-    expectRefusal({"score", "a\nb.db"}, "a\\nb.db: no such file");
+    expectRefusal({"score", "a\nb.db"}, "a\\nb.db: there is no such file: check the name");
     expectRefusal({"train", "--case", "no\tsuch\x1b[2J"}, "no\\tsuch\\x1b[2J: there is no such case");
     expectRefusal({"train", "--no\nsuch"}, "--no\\nsuch (see palpate train --help)");
 }

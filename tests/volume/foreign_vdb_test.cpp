@@ -41,7 +41,7 @@ TEST(ForeignVdb, LabelsComeInWhereTheGridHasThem)
     forEachIndex(Index3(0), Index3(5, 6, 7),
                  [&](Index3 n) { ASSERT_EQ(labels.image.values[labels.image.offset(n)], label(n.x, n.y, n.z)); });
     EXPECT_NEAR(glm::length(labels.image.affine.toPatient({2, 0, 1}) - 0.5e-3 * Vec3(0, 1, 4)), 0, 1e-12);
-    EXPECT_EQ(labels.warnings.size(), 2U);  // unit and frame are assumed
+    EXPECT_EQ(labels.warnings.size(), 3U);  // unit and frame are assumed, and 3 mm are little for a body
     EXPECT_NE(reason(written({grid, openvdb::FloatGrid::create()})).find("holds 2 grids"), std::string::npos);
     EXPECT_NE(reason(written({openvdb::BoolGrid::create()})).find("not labels"), std::string::npos);
     EXPECT_NE(reason(written({openvdb::FloatGrid::create()})).find("no voxel is set"), std::string::npos);
