@@ -166,6 +166,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
     const double slope = to.tissue.slope;
     const double steepness = slope + contacts.slope;
     const int maxTries = course_.effort.inParts ? maxInParts : limit > noLimit ? maxFromAbove : maxShortenings;
+    const double most = course_.effort.isTick ? longest : unbounded;
     double length = lineSearch(slope, to.tissue.curvature, contacts, 1);
     double gone = 0.0;
     for (int i = 0, searches = 0; length != 0.0;) {
@@ -177,7 +178,6 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         gone = length;
         const auto now = tissueForce(Field::f, to.field);
         const Parabola tissue{to.tissue.slope, (-now.product - to.tissue.slope) / gone};
-        const double most = course_.effort.isTick ? longest : unbounded;
         const double best = std::clamp(lineSearch(slope, tissue.curvature, contacts, newtonSteps), -most, most);
         const double further = std::max(1.0, std::abs(best / gone));
         const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;

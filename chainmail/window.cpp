@@ -136,11 +136,11 @@ CutCells CutFields::view() const noexcept
             {spread_[0].data(), spread_[1].data(), spread_[2].data()}};
 }
 
-bool Window::anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept
+bool Window::anyUncovered(Index3 first, Index3 last) const noexcept
 {
     bool any = false;
     volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, box - 2),
-                         [&](Index3 c) { any = any || cells[layout.at(c.x, c.y, c.z)] > 0.0F; });
+                         [&](Index3 c) { any = any || uncoveredMu[layout.at(c.x, c.y, c.z)] > 0.0F; });
     return any;
 }
 

@@ -148,8 +148,8 @@ struct Window {
     Index3 size() const noexcept { return box; }
     /// Node (0, 0, 0) of this window in the next coarser one.
     Index3 offsetIn(const Window& coarse) const noexcept { return low / 2 - coarse.low; }
-    /// True when one of the box's cells from `first` to `last` is not empty. @param cells  mu, or uncoveredMu
-    bool anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept;
+    /// True when one of the box's cells from `first` to `last` has tissue that no finer window covers.
+    bool anyUncovered(Index3 first, Index3 last) const noexcept;
     bool contains(Index3 node) const noexcept  // in the level's indices
     {
         return base::holds(box, node - low);

@@ -147,7 +147,7 @@ void handDown(Window& coarse, Field field, Window& fine) noexcept
     const Index3 last = (fine.size() - 1) / 2;
     volume::forEachIndex(Index3(0), last, [&](Index3 n) {
         const bool inside = isBetween(n, Index3(1), last - 1);
-        if (!inside && coarse.anyTissue(coarse.uncoveredMu, o + n - 1, o + n)) {
+        if (!inside && coarse.anyUncovered(o + n - 1, o + n)) {
             return;
         }
         const Index3 at = glm::clamp(2 * n, Index3(1), fine.size() - 2);
