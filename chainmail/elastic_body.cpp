@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace palpate::chainmail {
@@ -187,6 +188,29 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
     });
 }
 
+// Nodes in one to two layers of cells under the surface that have tissue in all cells around them, which none of the gaps
+// divides.
+void addSubsurface(const volume::DistanceField& surface, const CellLevel& finest, ElasticBody& body)
+{
+    constexpr double least = 0.5, most = 2.5;  // depth under the surface [cells]
+    const volume::NodeGrid& nodes = finest.nodes;
+    volume::forEachIndex(Index3(1), nodes.size - 2, [&](Index3 n) {
+        const double depth = -surface.at(nodes.position(n)) / nodes.spacing;
+        if (depth < least || depth > most || finest.fixed[nodes.offset(n)] != 0) {
+            return;
+        }
+        float softest = std::numeric_limits<float>::max();
+        volume::forEachIndex(n - 1, n, [&](Index3 cell) {
+            const bool isWhole = finest.fragments.cells.empty() || finest.fragments.in(cell, nodes.size.y).empty();
+            softest = std::min(softest, isWhole ? finest.mu[nodes.offset(cell)] : 0.0F);
+        });
+        if (softest > 0.0F) {
+            body.subsurface.push_back({n, softest});
+        }
+    });
+    body.subsurfaceRows = rowsOf(body.subsurface, nodes.size, &SubsurfaceNode::node);
+}
+
 // Of a cell with less tissue than fills an eighth of it by half: its eighths with most filled ones around them, and the
 // whole cell where there are none.
 std::uint8_t sliverOf(const std::vector<std::uint8_t>& octants, const volume::NodeGrid& nodes, Index3 cell)
@@ -260,6 +284,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     addCuts(cells, materials, surface, all.level);
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
+    addSubsurface(surface, body.levels.front(), body);
     body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
     body.held = std::move(all.held);
     return body;

@@ -59,6 +59,12 @@ struct SurfaceCell {
     std::uint32_t count = 0;
 };
 
+/// A node of the finest level inside the tissue, close under its surface.
+struct SubsurfaceNode {
+    Index3 node{0};
+    float mu = 0;  // of the softest cell around it [Pa]
+};
+
 constexpr double softPoisson = 0.45;  // of soft tissue
 
 /// Young's modulus of soft tissue with this shear modulus [Pa]: E = 2 mu (1 + nu).
@@ -120,7 +126,9 @@ struct ElasticBody {
     std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
     std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
-    double pieceEdge = 0;     // of the sub-cells of which each of them stands for the surface [m]
+    std::vector<SubsurfaceNode> subsurface;     // by z, then y, then x
+    std::vector<std::uint32_t> subsurfaceRows;  // see rowsOf()
+    double pieceEdge = 0;                       // of the sub-cells of which each of them stands for the surface [m]
     std::vector<float> held;  // of each cell of the finest level, what share of its tissue is held in space
     bool relaxes = false;     // its moduli are those right after a step
 };

@@ -202,6 +202,9 @@ Stretch StretchAt::operator()(const ContactSite& site) noexcept
         const auto beyond = volume::beyond(law_, 1.0, b, i);
         modulus_ = 1.0 + beyond.slope;
     }
+    if (site.isSubsurface) {
+        return {1.0, std::min(modulus_, maxStiffer)};
+    }
     const Vec3 n(stack_.body().points[site.point].normal);
     const Vec3 area = n.x * cofactor_[0] + n.y * cofactor_[1] + n.z * cofactor_[2];
     return {std::clamp(glm::length(area), minRatio, maxRatio), std::min(modulus_, maxStiffer)};

@@ -70,6 +70,10 @@ struct ElasticLoad {
 /// slips by mu p h / 2 E until it slides, 0.1 mm and less. As stiff as the push it would slide and stick from one call to
 /// the next, since a tool goes further in a millisecond.
 ///
+/// Points of the surface alone let a tool squeeze a soft layer of few cells out between them: a cell under its pole turns
+/// inside out, node by node, while the mean of its corners, from which its energy comes, does not. So the nodes under the
+/// surface are kept out of a tool as well. Where the tissue lies around the tool, none of them is inside it.
+///
 /// A call goes over all sites some fourteen times: what is asked for together lies in one cache line.
 struct alignas(64) ContactSite {
     static constexpr double gripOfPush = 0.1;  // stiffness of friction, of the push's
@@ -83,7 +87,8 @@ struct alignas(64) ContactSite {
     Vec3 force{0.0};   // on the tissue [N]
     double limit = 0;  // slip along the surface up to which friction is a spring in this call; 0: none [m]
     bool isTie = false;
-    float compressible = 0;  // Lacking::compressible
+    bool isSubsurface = false;  // a node under the surface, which a tool presses as it does a point of the surface
+    float compressible = 0;     // Lacking::compressible
 
     Vec3 rest{0.0};
     Vec3 slip{0.0};          // how far the tool went on since it took hold of the point, while they touch [m]

@@ -109,9 +109,14 @@ public:
     {
     }
 
-    // Stiffness of a surface point. Those of a tool in one window follow each other.
+    // Stiffness of a point that a tool may press. Those of the surface a tool in one window follow each other.
     void spread(ContactSite& s) noexcept
     {
+        if (s.isSubsurface) {
+            const double most = stiffened * stiffestPerArea(tools_[s.owner]) * static_cast<double>(s.area);
+            s.stiffness = std::min((isSmall_ ? 1.0 : stretchAt_(s).modulus) * s.atRest, most);
+            return;
+        }
         if (s.owner != owner_ || s.level != level_) {
             owner_ = s.owner;
             level_ = s.level;
@@ -211,7 +216,7 @@ void Elastic::keepSlips() noexcept
 {
     slips_.clear();
     for (const ContactSite& s : sites()) {
-        if (!s.isTie) {
+        if (!s.isTie && !s.isSubsurface) {
             slips_.push_back({s.point, s.owner, Vec3f(s.rest), Vec3f(s.slip), static_cast<float>(s.limit)});
         }
     }
@@ -310,7 +315,7 @@ void Elastic::letSlip() noexcept
 
 double Elastic::frictionOf(const ContactSite& site) const noexcept
 {
-    return site.isTie ? 0.0 : tools_[site.owner].friction;
+    return site.isTie || site.isSubsurface ? 0.0 : tools_[site.owner].friction;
 }
 
 }  // namespace palpate::chainmail

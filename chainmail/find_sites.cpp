@@ -103,6 +103,28 @@ public:
         }
     }
 
+    // Nodes under the surface that at rest were where the tool is.
+    void addSubsurface(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const auto& s = tool.shape;
+        const double around = s.widest() + near_;
+        const Vec3 most(grid.size - 1);
+        const Index3 from(
+            glm::clamp(glm::ceil((glm::min(s.a, s.b) - around - grid.origin) / grid.spacing), Vec3(0.0), most));
+        const Index3 to(
+            glm::clamp(glm::floor((glm::max(s.a, s.b) + around - grid.origin) / grid.spacing), Vec3(0.0), most));
+        for (int z = from.z; z <= to.z; ++z) {
+            for (int y = from.y; y <= to.y; ++y) {
+                const auto row = static_cast<std::size_t>(y + z * grid.size.y);
+                for (const SubsurfaceNode& n :
+                     inRow(body_.subsurface, body_.subsurfaceRows, row, from.x, to.x, &SubsurfaceNode::node)) {
+                    addNode(tool, shape, index, n);
+                }
+            }
+        }
+    }
+
     std::size_t count() const noexcept { return count_; }
 
 private:
@@ -224,6 +246,28 @@ private:
         }
     }
 
+    // Wider windows, which have the tissue far from the tools that are led, press with their surface alone.
+    void addNode(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
+                 const SubsurfaceNode& node) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const Vec3 at = grid.position(node.node);
+        if (count_ == out_.size() || shape.distance(at) > near_) {
+            return;
+        }
+        ContactSite& site = *std::construct_at(&out_[count_]);
+        site.rest = site.anchor = at;
+        site.owner = static_cast<std::uint16_t>(index);
+        site.isSubsurface = true;
+        site.area = static_cast<float>(grid.spacing * grid.spacing);
+        const SurfacePoint as{.position = Vec3f(at), .anchor = Vec3f(at), .area = site.area, .mu = node.mu};
+        site.atRest = site.stiffness = siteStiffness(body_, as, tool);
+        if (meetsTissue(site) && site.level == 0) {
+            findLacking(body_, as, site);
+            ++count_;
+        }
+    }
+
     // The surface of the sub-cell that was added last as `along` pieces along each of two edges, where it may soon touch.
     // Other sub-cells, in front of it or behind it, have the rest of the area, and are divided alike.
     // @param near  how far from the tool [cells]
@@ -342,7 +386,8 @@ std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) no
         whole += static_cast<double>(p.area);
     }
     const double share = whole > 0.0 ? std::min(sides * area / whole, 1.0) : 0.0;
-    return std::max(least, static_cast<std::size_t>(share * static_cast<double>(body.points.size()) + quarters));
+    const std::size_t all = body.points.size() + body.subsurface.size();
+    return std::max(least, static_cast<std::size_t>(share * static_cast<double>(all) + quarters));
 }
 
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
@@ -352,6 +397,9 @@ std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, 
     Finder finder(body, windows, near, out);
     for (std::size_t i = 0; i < tools.size(); ++i) {
         finder.addTool(tools[i], shapes[i], i < pressed.size() ? pressed[i] : PressedBox(), i);
+    }
+    for (std::size_t i = 0; i < tools.size(); ++i) {
+        finder.addSubsurface(tools[i], shapes[i], i);
     }
     return finder.count();
 }

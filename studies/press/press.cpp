@@ -291,7 +291,7 @@ double contactArea(const Elastic& elastic) noexcept
     double area = 0.0;
     chainmail::StretchAt stretchAt(elastic.stack(), volume::SmallStrain{});
     for (const chainmail::ContactSite& site : elastic.sites()) {
-        if (!site.isTie && site.active()) {
+        if (!site.isTie && !site.isSubsurface && site.active()) {
             area += stretchAt(site).area * static_cast<double>(site.area);
         }
     }

@@ -316,5 +316,33 @@ TEST(ElasticBody, BoneHoldsNoNodeInFrontOfIt)
     }
 }
 
+// Of a block whose surface lies on nodes, those of the first two layers under it, but for held ones and their like.
+TEST(ElasticBody, NodesUnderTheSurfaceAreThoseWithTissueAllAround)
+{
+    auto block = tests::heldBlock({8, 9, 10}, 2e-3, 1e4, 0.45);
+    block.material = [soft = block.material](Index3 c) {
+        volume::CellMaterial m = soft(c);
+        m.youngsModulus *= c == Index3(3, 1, 4) ? 0.5F : 1.0F;
+        return m;
+    };
+    const ElasticBody body = tests::bodyOf(block);
+    const auto mu = [](double e) { return static_cast<float>(e / (2.0 * 1.45)); };
+    std::vector<SubsurfaceNode> expected;
+    volume::forEachIndex(Index3(1), block.cells - 1, [&](Index3 n) {
+        const Index3 deep = glm::min(n, block.cells - n);
+        const bool isFixed = n.y >= block.cells.y - 1;
+        if (std::min({deep.x, deep.y, deep.z}) <= 2 && !isFixed) {
+            const Index3 off = n - Index3(3, 1, 4);
+            const bool besideTheSofter = off == glm::clamp(off, Index3(0), Index3(1));
+            expected.push_back({n + block.air, mu(besideTheSofter ? 5e3 : 1e4)});
+        }
+    });
+    ASSERT_EQ(body.subsurface.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_EQ(body.subsurface[i].node, expected[i].node);
+        EXPECT_FLOAT_EQ(body.subsurface[i].mu, expected[i].mu);
+    }
+}
+
 }  // namespace
 }  // namespace palpate::chainmail

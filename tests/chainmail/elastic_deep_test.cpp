@@ -194,6 +194,38 @@ TEST(ElasticDeep, ThreeRadiiDeepAndBackNothingPulls)
     }
 }
 
+// A cover of 3 mm over a hard lump stays between the lump and a ball that goes in by 1.4 radii, and no tool is held back:
+// the force grows all the way, and no node is inside the ball. With points of the surface alone nodes were in it from a
+// radius on, and the force ended.
+TEST(ElasticDeep, ASoftCoverIsNotSqueezedOutFromUnderABall)
+{
+    constexpr double radius = 6e-3;
+    auto block = tests::heldBlock({40, 21, 40}, 2e-3, 3250.0, 0.49);
+    block.air = 2;
+    block.material = [soft = block.material](Index3 c) {
+        volume::CellMaterial m = soft(c);
+        m.youngsModulus *= glm::distance(2e-3 * (Vec3(c) + 0.5), Vec3(40e-3, 18e-3, 40e-3)) < 15e-3 ? 13.0F : 1.0F;
+        return m;
+    };
+    const ElasticBody body = tests::bodyOf(block);
+    for (const double off : {0.0, 0.4e-3, 1e-3}) {
+        Elastic elastic(body, asInASession, tests::focusUnder(middle));
+        double before = 0.0;
+        for (double depth = 1e-3; depth < 8.6e-3; depth += 0.5e-3) {
+            ElasticTool tool = tests::ball(middle + Vec3(off, depth - radius, 0.5 * off), radius, 1e6);
+            tool.pushed = Vec3(0.0, depth, 0.0);
+            elastic.relax(tests::loadOf({&tool, 1}, {}, middle), 300, 1e-3);
+            const double force = -elastic.toolForce(0).y;
+            EXPECT_GT(force, 1.03 * before) << depth;
+            before = force;
+            for (const SubsurfaceNode& n : body.subsurface) {
+                const Vec3 rest = body.levels.front().nodes.position(n.node);
+                EXPECT_GT(glm::distance(rest + elastic.displacement(rest), tool.shape.a), 0.9 * radius) << depth;
+            }
+        }
+    }
+}
+
 // Deeper presses push harder: the force grows all the way, at finite strain and at small, held back or not.
 TEST(ElasticDeep, ForceGrowsWithDepth)
 {
