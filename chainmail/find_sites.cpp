@@ -103,7 +103,7 @@ public:
         }
     }
 
-    // Nodes under the surface that at rest were where the tool is.
+    // Nodes under the surface that at rest were where the tool is, and still are close to it.
     void addSubsurface(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
     {
         const auto& grid = body_.levels.front().nodes;
@@ -262,7 +262,7 @@ private:
         site.area = static_cast<float>(grid.spacing * grid.spacing);
         const SurfacePoint as{.position = Vec3f(at), .anchor = Vec3f(at), .area = site.area, .mu = node.mu};
         site.atRest = site.stiffness = siteStiffness(body_, as, tool);
-        if (meetsTissue(site) && site.level == 0) {
+        if (meetsTissue(site) && site.level == 0 && shape.distance(at + site.u) <= near_) {
             findLacking(body_, as, site);
             ++count_;
         }
