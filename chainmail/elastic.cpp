@@ -364,6 +364,7 @@ void Elastic::measure(ElasticResult& result) noexcept
             held.sunk = std::max(held.sunk, s.depth * static_cast<double>(s.resolved));
             const double push = glm::length(s.force);
             held.load += push;
+            held.under += s.isSubsurface ? push : 0.0;
             held.onEnds += isOnEnd(tools_[s.owner].shape, s.normal) ? push : 0.0;
             const Stretch now = stretchAt(s);
             held.indented += push * now.modulus * static_cast<double>(s.indented);

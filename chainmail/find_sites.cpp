@@ -14,9 +14,10 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double slight = 0.02;     // area of a surface point that is not worth dividing, in that of its sub-cell's face
-constexpr double close = 0.3;       // how far from a tool points are divided [cells],
-constexpr double smallPatch = 1.1;  // and how far from its middle where they are divided finely [cells]
+constexpr double slight = 0.02;       // area of a surface point that is not worth dividing, in that of its sub-cell's face
+constexpr double close = 0.3;         // how far from a tool points are divided [cells],
+constexpr double smallPatch = 1.1;    // and how far from its middle where they are divided finely [cells]
+constexpr double leastRadius = 1.25;  // of a tool that nodes under the surface hold up [cells]
 constexpr double lengthRounding = 1e-6;  // of a rod, in cells
 constexpr double otherTissue = 1.25;     // times as stiff as the softest along a ring of a rod
 constexpr double endless = 1.0;          // length of a rod [m]
@@ -108,6 +109,9 @@ public:
     {
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
+        if (s.widest() < leastRadius * grid.spacing) {
+            return;
+        }
         const double around = s.widest() + near_;
         const Vec3 most(grid.size - 1);
         const Index3 from(

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
 constexpr double maxStretch = 6.5;     // of the area under a tool
+constexpr double mostUnder = 0.2;      // of a tool's load, on nodes under the surface
 constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this fraction of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
 constexpr double maxSink = 0.25;       // but not over this fraction of the radius
@@ -84,7 +85,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     const double spacing = body.levels.front().nodes.spacing;
     const double sink = std::min(sinkRadii * radius + sinkSpacings * spacing, maxSink * radius);
     const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
-    const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
+    const double squeezed = load > 0.0 ? under / (mostUnder * load) : 0.0;
+    const double further = std::min(bears - sunk, ease * radius * (maxStretch - std::max(stretch, maxStretch * squeezed)));
     // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
     // counts as far as it goes further in itself.
     stopped = stop * std::clamp(stopped / stop + wanted - given - behind, 0.0, wanted - free);

@@ -10,6 +10,7 @@ namespace palpate::chainmail {
 ///
 ///     - the surface under it is stretched to six and a half times its area: from eight on, cells there have more than one
 ///       equilibrium, and the surface slips around the tool
+///     - nodes under the surface bear a fifth of its load: from two fifths on it slips through the surface, onto them alone
 ///     - the surface sinks into it by more than a bound, and than a contact that is as stiff as may be
 ///     - small strain is pressed by more than a radius
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
@@ -26,6 +27,7 @@ struct HeldTool {
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     Vec3 felt{0.0};       // force of its contacts in the last call [N]
     double load = 0;      // sum of the sizes of these [N]
+    double under = 0;     // the same of those of nodes under the surface [N]
     double indented = 0;  // the same of each times E / (1 - nu^2) of its tissue, see radiusOfPatch() [N Pa]
     double onEnds = 0;    // and of those on its ends, which is all of a ball's [N]
     double loaded = 0;    // how deep it was then [m]
@@ -39,7 +41,7 @@ struct HeldTool {
     /// Nothing is known yet of this call's contacts.
     void forgetContacts() noexcept
     {
-        depth = sunk = load = onEnds = indented = stretch = 0.0;
+        depth = sunk = load = under = onEnds = indented = stretch = 0.0;
         felt = lag = Vec3(0.0);
     }
     /// The tool for this call, as deep as the last one lets it go.
