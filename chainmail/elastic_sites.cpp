@@ -109,7 +109,7 @@ public:
     {
     }
 
-    // Stiffness of a point that a tool may press. Those of the surface a tool in one window follow each other.
+    // Stiffness of a point that a tool may press. Surface points of a tool in one window follow each other.
     void spread(ContactSite& s) noexcept
     {
         if (s.isSubsurface) {
