@@ -195,13 +195,16 @@ void addSubsurface(const volume::DistanceField& surface, const CellLevel& finest
     constexpr double least = 0.5, most = 2.5;  // depth under the surface [cells]
     const volume::NodeGrid& nodes = finest.nodes;
     volume::forEachIndex(Index3(1), nodes.size - 2, [&](Index3 n) {
+        if (finest.mu[nodes.offset(n)] <= 0.0F || finest.fixed[nodes.offset(n)] != 0) {
+            return;
+        }
         const double depth = -surface.at(nodes.position(n)) / nodes.spacing;
-        if (depth < least || depth > most || finest.fixed[nodes.offset(n)] != 0) {
+        if (depth < least || depth > most) {
             return;
         }
         float softest = std::numeric_limits<float>::max();
         volume::forEachIndex(n - 1, n, [&](Index3 cell) {
-            const bool isWhole = finest.fragments.cells.empty() || finest.fragments.in(cell, nodes.size.y).empty();
+            const bool isWhole = finest.fragments.in(cell, nodes.size.y).empty();
             softest = std::min(softest, isWhole ? finest.mu[nodes.offset(cell)] : 0.0F);
         });
         if (softest > 0.0F) {

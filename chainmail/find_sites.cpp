@@ -93,15 +93,7 @@ public:
         const Vec3 first = glm::min(s.a, s.b), last = glm::max(s.a, s.b);
         const Vec3 low = glm::min(glm::min(first, first - tool.pushed) - radius, pressed.low - around);
         const Vec3 high = glm::max(glm::max(last, last - tool.pushed) + radius, pressed.high + around);
-        // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
-        const Vec3 most(grid.size - 2);
-        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), most));
-        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), most));
-        for (int z = from.z; z <= to.z; ++z) {
-            for (int y = from.y; y <= to.y; ++y) {
-                addRow(tool, shape, index, static_cast<std::size_t>(y + z * grid.size.y), from.x, to.x);
-            }
-        }
+        forEachRow(low, high, [&](std::size_t row, int from, int to) { addRow(tool, shape, index, row, from, to); });
     }
 
     // Nodes under the surface that at rest were where the tool is, and still are close to it.
@@ -113,25 +105,33 @@ public:
             return;
         }
         const double around = s.widest() + near_;
-        const Vec3 most(grid.size - 1);
-        const Index3 from(
-            glm::clamp(glm::ceil((glm::min(s.a, s.b) - around - grid.origin) / grid.spacing), Vec3(0.0), most));
-        const Index3 to(
-            glm::clamp(glm::floor((glm::max(s.a, s.b) + around - grid.origin) / grid.spacing), Vec3(0.0), most));
-        for (int z = from.z; z <= to.z; ++z) {
-            for (int y = from.y; y <= to.y; ++y) {
-                const auto row = static_cast<std::size_t>(y + z * grid.size.y);
-                for (const SubsurfaceNode& n :
-                     inRow(body_.subsurface, body_.subsurfaceRows, row, from.x, to.x, &SubsurfaceNode::node)) {
-                    addNode(tool, shape, index, n);
-                }
+        forEachRow(glm::min(s.a, s.b) - around, glm::max(s.a, s.b) + around, [&](std::size_t row, int from, int to) {
+            for (const SubsurfaceNode& n :
+                 inRow(body_.subsurface, body_.subsurfaceRows, row, from, to, &SubsurfaceNode::node)) {
+                addNode(tool, shape, index, n);
             }
-        }
+        });
     }
 
     std::size_t count() const noexcept { return count_; }
 
 private:
+    // Calls visit(row, first, last) for the rows of cells that meet a box. Cells in the list of the surface are numbered by
+    // their middles' grid, which starts at the lowest node; a node has the number of the cell above it.
+    template <typename Visit>
+    void forEachRow(Vec3 low, Vec3 high, const Visit& visit) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const Vec3 most(grid.size - 2);
+        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), most));
+        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), most));
+        for (int z = from.z; z <= to.z; ++z) {
+            for (int y = from.y; y <= to.y; ++y) {
+                visit(static_cast<std::size_t>(y + z * grid.size.y), from.x, to.x);
+            }
+        }
+    }
+
     // A piece of a rod: rings of points around it, one per cell along it. Points that would lie outside of the tissue move
     // with the axis.
     void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
