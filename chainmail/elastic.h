@@ -17,7 +17,7 @@ struct ElasticOptions {
     int cycles = 2;                           // per call of relax(); one more where that leaves much out of balance
     volume::Law law = volume::SmallStrain{};  // of all tissue
     double period = 1e-3;                     // of a tick [s]: what relaxes does so by the ticks that its loads name
-    std::size_t maxSites = 4096;              // surface points and ties that are held at once, at least
+    std::size_t maxSites = 4096;              // points, nodes under the surface and ties held at once, at least
     double touches = 0;       // surface of the tools that press: more sites where those need it, see sitesFor() [m^2]
     double tolerance = 0.01;  // no more once the forces out of balance are this fraction of the contacts' [-]
     double unfelt = 0.0;      // and none beyond `cycles` while they are less than this [N]
