@@ -106,9 +106,9 @@ void runImport(ImportArguments o)
     o.reading.sheared = o.steps.voxel > 0;
     if (!o.mapping.writeMap.empty()) {
         const auto [labels, counts] = prepare::readLabels(o, tell);
-        const std::size_t open = prepare::writeLabelMap(o.mapping, o.input, labels, counts, table);
+        const prepare::BegunMap begun = prepare::writeLabelMap(o.mapping, o.input, labels, counts, table);
         progress.clear();
-        fmt::print("{}: {} labels, {} of them to be filled in\n", o.mapping.writeMap.string(), counts.size(), open);
+        fmt::print("{}: {} labels, {} of them to be filled in\n", o.mapping.writeMap.string(), begun.labels, begun.open);
         return;
     }
     const prepare::ImportedVolume made = prepare::importVolume(o, table, tell);

@@ -2,6 +2,7 @@
 
 #include <apps/no_thread.h>
 #include <base/build.h>
+#include <base/error.h>
 #include <base/inputs.h>
 #include <base/one_line.h>
 #include <command/interrupted.h>
@@ -9,13 +10,25 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <string>
 #include <system_error>
 
 namespace palpate::apps {
+
+/// What a program printed and nobody got is no success: a full disk behind `>`, a closed pipe. Throws.
+inline void checkStandardOutput()
+{
+    errno = 0;
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+        throw base::error("standard output: cannot be written{}",
+                          errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : "");
+    }
+}
 
 /// Does the work of a program, and says what it throws in one line on standard error, also where a name in it has several.
 /// Returns the exit status: 0, 1 for what was thrown, 2 for arguments, 128 + signal for what a signal has ended.
@@ -26,10 +39,15 @@ int exitStatus(const CLI::App& app, const Work& work)
         std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), base::oneLine(what).c_str());
     };
     try {
-        work();
+        try {
+            work();
+        } catch (const CLI::ParseError& e) {
+            if (app.exit(e) != 0) {
+                return 2;
+            }
+        }
+        checkStandardOutput();
         return 0;
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
     } catch (const command::Interrupted& e) {
         say(e.what());
         return e.exitStatus();

@@ -153,11 +153,11 @@ std::string palpateProgram()
 // What nobody got was not printed.
 TEST_F(RecordEdits, AFullDeviceBehindTheOutputIsAnError)
 {
-    for (const std::string command : {"score", "replay"}) {
-        const std::string words = command + " " + original();
+    for (const std::string& words :
+         {"score " + original(), "replay " + original(), std::string("--version"), std::string("help")}) {
         const Outcome outcome = Program("/bin/sh", {"-c", palpateProgram() + " " + words + " > /dev/full"}).wait();
-        EXPECT_EQ(outcome.status, 1) << command;
-        EXPECT_NE(outcome.err.find("standard output"), std::string::npos) << command << ": " << outcome.err;
+        EXPECT_EQ(outcome.status, 1) << words;
+        EXPECT_NE(outcome.err.find("standard output"), std::string::npos) << words << ": " << outcome.err;
     }
     expectRefusal({"score", original(), "--json", "/dev/full"}, "/dev/full: cannot be written");
     // Nor can the error be said there.

@@ -190,9 +190,14 @@ TEST_F(Researcher, LabelMapsAreListedWithTheirSources)
 TEST_F(Researcher, ALabelMapIsBegunAndFilledIn)
 {
     const std::string map = folder / "map.toml";
-    ASSERT_EQ(palpate({"import", bare, "--write-map", map}).status, 0);
-    expectRefusal({"import", bare, "--map", map, "-o", vdb}, "no tissue '?': write in the label map which one it is");
+    const Outcome begun = palpate({"import", bare, "--write-map", map});
+    ASSERT_EQ(begun.status, 0);
     std::string text = readText(map);
+    const auto labels = std::ranges::count(text, '{');
+    EXPECT_TRUE(begun.out.starts_with(map + ": " + std::to_string(labels) + " labels, ")) << begun.out;
+    const std::vector<std::string> import{"import", bare, "--map", map, "-o", vdb};
+    expectRefusal(import, "no tissue '?': write in the label map which one it is");
+    expectRefusal(import, map + ": label ");
     for (std::size_t at = text.find("\"?\"", text.find("labels")); at != std::string::npos; at = text.find("\"?\"", at)) {
         text.replace(at, 3, "\"liver\"");
     }

@@ -11,7 +11,6 @@
 #include <cctype>
 #include <functional>
 #include <optional>
-#include <set>
 
 namespace palpate::prepare {
 
@@ -406,6 +405,9 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     std::vector<std::string> byName, byDefault, names, values;
     for (const auto& [value, voxels] : counts) {
         FoundLabel found = mapper.tissueOf(value);
+        base::failIf(!options.map.empty() && found.certain && found.label.tissue.starts_with('?'),
+                     "{}: label {} '{}': no tissue '{}': write in the label map which one it is", options.map, value,
+                     found.label.name, found.label.tissue);
         if (found.certain) {
             if (found.byItsName) {
                 byName.push_back(
@@ -430,13 +432,13 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     return named;
 }
 
-std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::path& file,
-                          const volume::ImportedLabels& labels, const LabelCounts& counts, const volume::TissueTable& table)
+BegunMap writeLabelMap(const MappingOptions& options, const std::filesystem::path& file,
+                       const volume::ImportedLabels& labels, const LabelCounts& counts, const volume::TissueTable& table)
 {
     std::vector<std::string> notes;
     const Mapper mapper(options, file, labels, counts, table, notes);
     LabelMap map{file.stem().string(), {}, {}};
-    std::set<std::uint16_t> open;
+    BegunMap begun;
     std::string further;
     for (const auto& [value, voxels] : counts) {
         if (const std::int64_t original = labels.originalOf(value); original != value) {
@@ -449,7 +451,7 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
             continue;
         }
         if (!found.certain) {
-            open.insert(value);
+            ++begun.open;
             found.label.tissue = found.label.tissue.empty() ? "?" : "? " + found.label.tissue;
         }
         map.labels.push_back(std::move(found.label));
@@ -458,7 +460,8 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
         fmt::format("# Which tissue each label of {} is: replace every \"?\" by a row of the tissue table.\n",
                     file.filename().string());
     base::writeWhole(options.writeMap, text + further + datasets::labelMapText(map));
-    return open.size();
+    begun.labels = map.labels.size();
+    return begun;
 }
 
 }  // namespace palpate::prepare

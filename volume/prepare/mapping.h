@@ -39,10 +39,15 @@ std::vector<volume::LabelName> mapLabels(const MappingOptions& options, const st
                                          const volume::ImportedLabels& labels, const LabelCounts& counts,
                                          const volume::TissueTable& table, std::vector<std::string>& notes);
 
+/// A label map that the user is to fill in.
+struct BegunMap {
+    std::size_t labels = 0;  // that are in it
+    std::size_t open = 0;    // of which the tissue is only suggested, or not known
+};
+
 /// Writes what is known of the labels as a label map for the user to edit: tissues that are only suggested, or not known,
-/// are marked. Returns how many those are.
-std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::path& file,
-                          const volume::ImportedLabels& labels, const LabelCounts& counts,
-                          const volume::TissueTable& table);
+/// are marked.
+BegunMap writeLabelMap(const MappingOptions& options, const std::filesystem::path& file,
+                       const volume::ImportedLabels& labels, const LabelCounts& counts, const volume::TissueTable& table);
 
 }  // namespace palpate::prepare
