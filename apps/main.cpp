@@ -2,7 +2,6 @@
 #include <apps/parsed_program.h>
 #include <apps/version.h>
 #include <base/child_process.h>
-#include <base/error.h>
 #include <base/mapped.h>
 #include <base/nearest.h>
 #include <base/one_line.h>
@@ -14,7 +13,6 @@
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <string>

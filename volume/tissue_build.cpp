@@ -135,8 +135,6 @@ typename Grid::Ptr gridOf(const LabelImage& image, const ValueAt& valueAt, typen
 std::uint8_t rowOf(const TissueTable& table, const LabelName& label)
 {
     base::failIf(label.tissue.empty(), "label {} '{}' has no tissue: map it to one", label.value, label.name);
-    base::failIf(label.tissue.starts_with('?'), "label {} '{}': no tissue '{}': write in the label map which one it is",
-                 label.value, label.name, label.tissue);
     const auto row = table.find(label.tissue);
     base::failIf(!row, "label {} '{}': no tissue '{}' in the tissue table '{}'", label.value, label.name, label.tissue,
                  table.name);

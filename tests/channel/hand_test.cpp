@@ -235,12 +235,12 @@ TEST(Exchange, AViewerAttachesAtTheFirstTryAtAnyTime)
         const std::vector<std::uint8_t> copy(viewer->labels().begin(), viewer->labels().end());
         EXPECT_EQ(copy.size(), 160U * 160U * 160U);
         // A writer that loses its core in the middle of a write leaves nothing to be read until it goes on.
-        bool hasState = false;
-        for (int k = 0; k < 1000 && !hasState; ++k) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(k == 0 ? 0 : 1));
-            hasState = viewer->state().has_value();
+        auto state = viewer->state();
+        for (int k = 0; k < 1000 && !state; ++k) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            state = viewer->state();
         }
-        EXPECT_TRUE(hasState);
+        EXPECT_TRUE(state);
     }
     stop = true;
     simulation.join();

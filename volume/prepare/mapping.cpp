@@ -405,10 +405,10 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     std::vector<std::string> byName, byDefault, names, values;
     for (const auto& [value, voxels] : counts) {
         FoundLabel found = mapper.tissueOf(value);
-        base::failIf(!options.map.empty() && found.certain && found.label.tissue.starts_with('?'),
-                     "{}: label {} '{}': no tissue '{}': write in the label map which one it is", options.map, value,
-                     found.label.name, found.label.tissue);
         if (found.certain) {
+            base::failIf(!options.map.empty() && found.label.tissue.starts_with('?'),
+                         "{}: label {} '{}': no tissue '{}': write in the label map which one it is", options.map, value,
+                         found.label.name, found.label.tissue);
             if (found.byItsName) {
                 byName.push_back(
                     fmt::format("label {} '{}' is taken as {} by its name", value, found.label.name, found.label.tissue));
