@@ -11,6 +11,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 namespace palpate::volume {
 
@@ -29,24 +30,20 @@ public:
     // Of the sum with a number that is even between -width / 2 and width / 2.
     void addBox(double width)
     {
-        if (width < step_) {
-            return;
-        }
-        const std::vector<double> sum = integrals();
-        for (int i = -half_; i <= half_; ++i) {
-            const double at = i * step_;
-            value(i) = (read(sum, at + 0.5 * width) - read(sum, at - 0.5 * width)) / width;
+        if (width >= step_) {
+            const std::vector<double> sum = integrals();
+            values_.assign(values_.size(), 0.0);
+            addShifted(sum, 0.5 * width, 1.0 / width);
+            addShifted(sum, -0.5 * width, -1.0 / width);
         }
     }
 
     // Of the sum with -way / 2 or way / 2, as likely.
     void addStep(double way)
     {
-        const std::vector<double> before = values_;
-        for (int i = -half_; i <= half_; ++i) {
-            const double at = i * step_;
-            value(i) = 0.5 * (read(before, at - 0.5 * way) + read(before, at + 0.5 * way));
-        }
+        const std::vector<double> before = std::exchange(values_, std::vector<double>(values_.size(), 0.0));
+        addShifted(before, 0.5 * way, 0.5);
+        addShifted(before, -0.5 * way, 0.5);
     }
 
     // Numbers under which `fraction` of all lie, for ascending fractions.
@@ -67,7 +64,6 @@ public:
     }
 
 private:
-    double& value(int i) { return values_[static_cast<std::size_t>(i + half_)]; }
     // Up to each place, by the trapezoidal rule.
     std::vector<double> integrals() const
     {
@@ -77,13 +73,28 @@ private:
         }
         return sum;
     }
-    // Linear between the steps, and even beyond the ends.
-    double read(const std::vector<double>& values, double at) const
+    // Adds to each place `factor` times the value `way` farther on: linear between the steps, and even beyond the ends.
+    void addShifted(const std::vector<double>& values, double way, double factor)
     {
-        const double place = std::clamp(at / step_ + half_, 0.0, static_cast<double>(values.size() - 1));
-        const auto low = std::min(static_cast<std::size_t>(place), values.size() - 2);
-        const double t = place - static_cast<double>(low);
-        return (1.0 - t) * values[low] + t * values[low + 1];
+        const double steps = std::floor(way / step_);
+        const double t = way / step_ - steps;
+        const auto count = static_cast<std::ptrdiff_t>(values.size());
+        const auto shift = std::clamp(static_cast<std::ptrdiff_t>(steps), -count, count);
+        const auto add = [&](std::ptrdiff_t i, std::ptrdiff_t low, std::ptrdiff_t high) {
+            values_[static_cast<std::size_t>(i)] +=
+                factor * ((1.0 - t) * values[static_cast<std::size_t>(low)] + t * values[static_cast<std::size_t>(high)]);
+        };
+        const std::ptrdiff_t first = std::max<std::ptrdiff_t>(-shift, 0);
+        const std::ptrdiff_t end = std::max(std::min(count - 1 - shift, count), first);
+        for (std::ptrdiff_t i = 0; i < first; ++i) {
+            add(i, 0, 0);
+        }
+        for (std::ptrdiff_t i = first; i < end; ++i) {
+            add(i, i + shift, i + shift + 1);
+        }
+        for (std::ptrdiff_t i = end; i < count; ++i) {
+            add(i, count - 1, count - 1);
+        }
     }
 
     double step_;
@@ -133,9 +144,9 @@ public:
     {
         findPlanes();
         const BlurredSurface found = pointsInOwnCells();
-        all_ = rowsOf(found.points);
+        all_ = boxesOf(found.points);
         if (reach_ > widestOfAll) {
-            sparse_ = rowsOf(fewer(found));
+            sparse_ = boxesOf(fewer(found));
         }
         BlurredSurface fitted = found;
         forEach(found.nodes.size(), [&](std::size_t k) { fit(found, k, fitted); });
@@ -212,36 +223,38 @@ private:
         return found;
     }
 
-    // Points by rows of nodes along x.
-    struct Rows {
-        std::vector<SurfacePoint> points;
-        std::vector<float> x;              // of each point
-        std::vector<std::uint32_t> first;  // of each row, and the end
+    // Points by boxes of nodes; boxes of a row along x are one behind the other.
+    struct Boxes {
+        PointColumns points;
+        std::vector<std::uint32_t> first;  // of each box, and the end
     };
 
-    std::size_t rowOf(Index3 n) const
-    {
-        return static_cast<std::size_t>(n.y) + static_cast<std::size_t>(n.z) * static_cast<std::size_t>(grid_.size.y);
-    }
+    static constexpr int boxEdge = 4;  // [nodes]
 
-    Rows rowsOf(const std::vector<SurfacePoint>& points) const
+    Index3 boxes() const { return (grid_.size + boxEdge - 1) / boxEdge; }
+    std::size_t boxOf(Index3 box) const
     {
-        const auto row = [&](const SurfacePoint& point) {
-            return rowOf(glm::clamp(Index3(glm::round(point.at)), Index3(0), grid_.size - 1));
-        };
-        Rows rows{std::vector<SurfacePoint>(points.size()), std::vector<float>(points.size()), {}};
-        rows.first.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
+        return static_cast<std::size_t>(box.x) +
+               static_cast<std::size_t>(boxes().x) *
+                   (static_cast<std::size_t>(box.y) +
+                    static_cast<std::size_t>(boxes().y) * static_cast<std::size_t>(box.z));
+    }
+    // Of a place; of one outside of the grid the next box.
+    Index3 boxAt(Vec3f at) const { return glm::clamp(Index3(glm::floor(at)), Index3(0), grid_.size - 1) / boxEdge; }
+
+    Boxes boxesOf(const std::vector<SurfacePoint>& points) const
+    {
+        Boxes boxed{PointColumns(points.size()), {}};
+        boxed.first.assign(boxOf(boxes() - 1) + 2, 0);
         for (const SurfacePoint& point : points) {
-            ++rows.first[row(point) + 1];
+            ++boxed.first[boxOf(boxAt(point.at)) + 1];
         }
-        std::partial_sum(rows.first.begin(), rows.first.end(), rows.first.begin());
-        std::vector<std::uint32_t> next(rows.first.begin(), rows.first.end() - 1);
+        std::partial_sum(boxed.first.begin(), boxed.first.end(), boxed.first.begin());
+        std::vector<std::uint32_t> next(boxed.first.begin(), boxed.first.end() - 1);
         for (const SurfacePoint& point : points) {
-            const std::uint32_t k = next[row(point)]++;
-            rows.points[k] = point;
-            rows.x[k] = point.at.x;
+            boxed.points.set(next[boxOf(boxAt(point.at))]++, point);
         }
-        return rows;
+        return boxed;
     }
 
     // A wide paraboloid needs no more: of nodes that are one behind the other under the surface one point, in the middle
@@ -293,34 +306,16 @@ private:
         return along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
     }
 
-    // Adds those of the points from `first` to `end`, in this order, that are within reach along x: most are farther away,
-    // and are passed over without a branch.
-    static void addNear(const Rows& rows, std::uint32_t first, std::uint32_t end, Paraboloid& paraboloid)
-    {
-        constexpr std::uint32_t some = 64;
-        std::array<std::uint32_t, some> near;
-        for (std::uint32_t begin = first; begin < end; begin += some) {
-            std::size_t count = 0;
-            for (std::uint32_t o = begin; o < std::min(begin + some, end); ++o) {
-                near[count] = o;
-                count += paraboloid.isNearAlongX(rows.x[o]) ? 1 : 0;
-            }
-            for (std::size_t i = 0; i < count; ++i) {
-                paraboloid.add(rows.points[near[i]]);
-            }
-        }
-    }
-
     std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
     {
         Paraboloid paraboloid(found.points[k], reach);
-        const Rows& rows = reach > widestOfAll ? sparse_ : all_;
-        const Index3 n = grid_.node(found.nodes[k]);
-        const int nodes = static_cast<int>(std::ceil(reach));
-        const int lowest = std::max(n.y - nodes, 0);
-        const int highest = std::min(n.y + nodes, grid_.size.y - 1);
-        for (int z = std::max(n.z - nodes, 0); z <= std::min(n.z + nodes, grid_.size.z - 1); ++z) {
-            addNear(rows, rows.first[rowOf({0, lowest, z})], rows.first[rowOf({0, highest, z}) + 1], paraboloid);
+        const Boxes& boxed = reach > widestOfAll ? sparse_ : all_;
+        const Index3 low = boxAt(found.points[k].at - reach);
+        const Index3 high = boxAt(found.points[k].at + reach);
+        for (int z = low.z; z <= high.z; ++z) {
+            for (int y = low.y; y <= high.y; ++y) {
+                paraboloid.add(boxed.points, boxed.first[boxOf({low.x, y, z})], boxed.first[boxOf({high.x, y, z}) + 1]);
+            }
         }
         return paraboloid.solve() ? std::optional(paraboloid) : std::nullopt;
     }
@@ -350,7 +345,7 @@ private:
     std::vector<std::uint32_t> nodes_;
     std::vector<Vec3f> normals_;  // of nodes_
     std::vector<float> depth_;    // of all nodes
-    Rows all_, sparse_;
+    Boxes all_, sparse_;
 };
 
 }  // namespace

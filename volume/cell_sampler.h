@@ -32,7 +32,7 @@ public:
         const Vec3 voxel = tissue.affine.spacing();
         const double finest = std::min({voxel.x, voxel.y, voxel.z});
         isCoarse_ = forMaterial && std::max({voxel.x, voxel.y, voxel.z}) > coarseVoxel * grid.spacing;
-        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, 4);
+        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, mostSamples);
         for (int i = 0; i < s * s * s; ++i) {
             const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
             places_.push_back(2.0 * at);
@@ -47,6 +47,7 @@ public:
         farthest_ = std::sqrt(3.0) * (0.5 * grid.spacing + std::max({voxel.x, voxel.y, voxel.z}));
         step_ = toIndex * grid.spacing;
         start_ = toIndex * (grid.origin - tissue.affine.origin);
+        findLines(s);
     }
 
     // Variance of the place in which visit() reads a node's cell, along each patient axis: of the samples, and of the hats
@@ -107,6 +108,12 @@ public:
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
+        if constexpr (!takesPlace<Visit>) {
+            if (isAligned_) {
+                visitVoxels(n, visit);
+                return;
+            }
+        }
         forEachSample(n, [&](Vec3 at, double fraction, Vec3 place) { visitAround(at, fraction, place, visit); });
     }
 
@@ -159,6 +166,76 @@ public:
     }
 
 private:
+    template <typename Visit>
+    static constexpr bool takesPlace = std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>;
+    static constexpr int mostSamples = 4;  // along an edge of a cell
+
+    // The voxels along one of their axes that the samples of a cell read, each once, with their share.
+    struct Line {
+        std::array<int, 2 * mostSamples> voxels;
+        std::array<double, 2 * mostSamples> weights;
+        std::size_t count = 0;
+
+        void add(int voxel, double weight)
+        {
+            std::size_t i = 0;
+            while (i < count && voxels[i] != voxel) {
+                ++i;
+            }
+            if (i == count) {
+                voxels[i] = voxel;
+                weights[i] = 0.0;
+                ++count;
+            }
+            weights[i] += weight;
+        }
+    };
+
+    // Where each axis of the voxels is parallel to one of the grid's, a sample's place along it depends on one index alone.
+    void findLines(int samples)
+    {
+        for (int axis = 0; axis < 3; ++axis) {
+            const Vec3 steps(step_[0][axis], step_[1][axis], step_[2][axis]);
+            isAligned_ = isAligned_ && (steps.x != 0.0 ? 1 : 0) + (steps.y != 0.0 ? 1 : 0) + (steps.z != 0.0 ? 1 : 0) == 1;
+            for (int i = 0; i < samples; ++i) {
+                along_[static_cast<std::size_t>(axis)].push_back(glm::length(steps) * ((i + 0.5) / samples - 0.5));
+            }
+        }
+    }
+
+    Line lineOf(int axis, double centre) const
+    {
+        Line line;
+        const std::vector<double>& offsets = along_[static_cast<std::size_t>(axis)];
+        const double share = 1.0 / static_cast<double>(offsets.size());
+        for (const double offset : offsets) {
+            const double at = centre + offset;
+            const double low = std::floor(at);
+            line.add(static_cast<int>(low), (1.0 - (at - low)) * share);
+            if (at > low) {
+                line.add(static_cast<int>(low) + 1, (at - low) * share);
+            }
+        }
+        return line;
+    }
+
+    // visit() where the axes are parallel: every voxel once.
+    template <typename Visit>
+    void visitVoxels(Index3 n, const Visit& visit) const
+    {
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const std::array<Line, 3> lines{lineOf(0, centre.x), lineOf(1, centre.y), lineOf(2, centre.z)};
+        for (std::size_t k = 0; k < lines[2].count; ++k) {
+            for (std::size_t j = 0; j < lines[1].count; ++j) {
+                const double weight = lines[2].weights[k] * lines[1].weights[j];
+                for (std::size_t i = 0; i < lines[0].count; ++i) {
+                    read({lines[0].voxels[i], lines[1].voxels[j], lines[2].voxels[k]}, weight * lines[0].weights[i],
+                         Vec3(0.0), visit);
+                }
+            }
+        }
+    }
+
     // Calls visit(voxel coordinates, fraction of the cell, place in the cell) for each sample of node n's cell.
     template <typename Visit>
     void forEachSample(Index3 n, const Visit& visit) const
@@ -191,7 +268,7 @@ private:
         if (base::holds(size_, n)) {
             const openvdb::Coord ijk(n.x, n.y, n.z);
             const std::uint16_t label = labelAt(ijk);
-            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>) {
+            if constexpr (takesPlace<Visit>) {
                 visit(label, weight, ijk, place);
             } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
                 visit(label, weight, ijk);
@@ -223,11 +300,13 @@ private:
     mutable const openvdb::Int32* leaf_ = nullptr;
     mutable openvdb::Int32 tile_ = 0;
     openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
-    const TissueData* scaledBy_;  // null where no image scales the stiffness
-    Vec3 reach_{0.0};             // of the samples along each axis [voxels]
-    std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
-    std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
-    std::vector<Vec3> inOctant_;  // samples of an eighth of a cell, in voxels from its middle
+    const TissueData* scaledBy_;                // null where no image scales the stiffness
+    Vec3 reach_{0.0};                           // of the samples along each axis [voxels]
+    std::vector<Vec3> offsets_;                 // samples of a cell, in voxels from the node
+    std::vector<Vec3> places_;                  // the same, -1 to 1 along each edge of the cell
+    std::array<std::vector<double>, 3> along_;  // of the samples along each axis of voxels, from the node, if isAligned_
+    bool isAligned_ = true;                     // the axes of voxels with those of the grid
+    std::vector<Vec3> inOctant_;                // samples of an eighth of a cell, in voxels from its middle
     double farthest_ = 0.0;
     Mat3 step_{1.0};         // node steps in voxels
     Vec3 start_{0.0};        // node (0, 0, 0) in voxels

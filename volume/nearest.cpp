@@ -39,7 +39,10 @@ private:
 class Sweep {
 public:
     Sweep(Index3 size, const Places& places, std::vector<std::int32_t>& nearest)
-        : size_(size), places_(places), nearest_(nearest), distance_(nearest.size(), std::numeric_limits<float>::max())
+        : size_(size),
+          places_(places),
+          nearest_(nearest),
+          distance_(nearest.size(), places.squaredDistance(Vec3f(0.0F), -1))
     {
     }
 
@@ -93,28 +96,36 @@ private:
     {
         return static_cast<std::ptrdiff_t>(size_.x) * (y + static_cast<std::ptrdiff_t>(size_.y) * z);
     }
-    // The first and last node that took a point; of none, the last is before the first.
+    // The first and last node that took a point; of none, the last is before the first. Without a branch, as in Join.
     std::pair<int, int> takeRow(int y, int z, std::ptrdiff_t from)
     {
+        std::int32_t* mine = nearest_.data() + row(y, z);
+        const std::int32_t* theirs = mine + from;
+        float* least = distance_.data() + row(y, z);
+        Vec3f at(0, y, z);
         int first = size_.x;
         int last = -1;
-        for (int x = 0; x < size_.x; ++x) {
-            if (take({x, y, z}, row(y, z) + x, from)) {
-                first = std::min(first, x);
-                last = x;
-            }
+        for (int x = 0; x < size_.x; ++x, ++at.x) {
+            const std::int32_t point = theirs[x];
+            const float d = places_.squaredDistance(at, point);
+            const bool isNearer = d < least[x];
+            least[x] = isNearer ? d : least[x];
+            mine[x] = isNearer ? point : mine[x];
+            first = std::min(first, isNearer ? x : size_.x);
+            last = isNearer ? x : last;
         }
         return {first, last};
     }
-    // Of a row in which nodes of `changed` alone have something to give.
+    // Of a row in which nodes of `changed` alone have something to give: each pass ends behind the last node that took a
+    // point.
     void sweepRow(int y, int z, std::pair<int, int> changed)
     {
-        int last = changed.second;
-        for (int x = changed.first + 1; x < size_.x; ++x) {
+        auto [first, last] = changed;
+        for (int x = first + 1; x < size_.x && x <= last + 1; ++x) {
             last = take({x, y, z}, row(y, z) + x, -1) ? std::max(last, x) : last;
         }
-        for (int x = last - 1; x >= 0; --x) {
-            take({x, y, z}, row(y, z) + x, 1);
+        for (int x = last - 1; x >= 0 && x >= first - 1; --x) {
+            first = take({x, y, z}, row(y, z) + x, 1) ? std::min(first, x) : first;
         }
     }
 

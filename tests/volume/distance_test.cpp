@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -379,6 +380,44 @@ TEST(Modulus, OfAHalfAndHalfCellIsTheRootOfArithmeticTimesHarmonicMean)
     EXPECT_NEAR(at(1, 1), std::sqrt(3.25e3 * 43.7e3), 1e-1);
     EXPECT_NEAR(at(2, 1), 43.7e3, 1e-2);
     EXPECT_NEAR(at(1, 3), std::sqrt(3.25e3 * 43.7e3), 1e-1) << "half of the cell is air";
+}
+
+// Where axes are parallel, each voxel of a cell is read once and weighed along each axis; else the cell's samples are read
+// one by one. Axes that are turned by nothing worth naming give the same fields, whichever axes are parallel and wherever
+// the grid is.
+TEST(Modulus, OfParallelAxesIsThatOfAxesTurnedByAlmostNothing)
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const std::array<std::array<int, 3>, 3> orders{{{0, 1, 2}, {2, 0, 1}, {1, 0, 2}}};
+    for (int run = 0; run < 12; ++run) {
+        const auto& order = orders[static_cast<std::size_t>(run) % orders.size()];
+        Affine affine{Mat3(0.0), {}};
+        for (int k = 0; k < 3; ++k) {
+            affine.linear[k][order[static_cast<std::size_t>(k)]] =
+                (unit(random) < 0.0 ? -1.0 : 1.0) * std::exp(unit(random)) * 1.2e-3;
+        }
+        LabelImage image{{23, 19, 21}, affine, {}};
+        image.affine = centred(image.affine, image.size);
+        image.values.resize(image.offset({0, 0, image.size.z}));
+        std::generate(image.values.begin(), image.values.end(), [&] {
+            return std::array<std::uint16_t, 2>{1, 7}[random() % 3 / 2];
+        });
+        const Tissue parallel = Tissue::fromLabels(image, table(), names(), {});
+        image.affine.linear = (Mat3(1.0) + Mat3(0, 1e-12, 0, 0, 0, 1e-12, 1e-12, 0, 0)) * image.affine.linear;
+        const Tissue turned = Tissue::fromLabels(image, table(), names(), {});
+        const Vec3 middle = 1e-3 * Vec3(unit(random), unit(random), unit(random));
+        const NodeGrid grid{{5, 6, 4}, middle - 4e-3, 2e-3 * std::exp(0.6 * unit(random))};
+        const ScalarField a = parallel.youngsModulusOn(grid), b = turned.youngsModulusOn(grid);
+        for (std::size_t i = 0; i < a.values.size(); ++i) {
+            EXPECT_NEAR(a.values[i], b.values[i], 1e-5 * static_cast<double>(b.values[i])) << run << " " << i;
+        }
+        const std::array<std::uint16_t, 1> lump{7};
+        const DistanceField c = parallel.distanceTo(lump, grid), d = turned.distanceTo(lump, grid);
+        for (std::size_t i = 0; i < c.values.size(); ++i) {
+            EXPECT_NEAR(c.values[i], d.values[i], 1e-6) << run << " " << i;
+        }
+    }
 }
 
 // A cell with bone is a layer of what is not bone, as much stiffer as it is thinner.
