@@ -9,9 +9,10 @@
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
 # PALPATE_BUILT: libraries to take from the build folder PALPATE_BUILT_IN instead, with this folder's sources as they were there.
+# WARM: works beside ticks, and no loop over a body is in it.
 # UNINSTALLED: for a program of ours only: commands, pages and windows, in which no tick runs.
 function(palpate_library name)
-  cmake_parse_arguments(arg "UNINSTALLED" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
+  cmake_parse_arguments(arg "UNINSTALLED;WARM" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
   set(target palpate_${name})
   if(name IN_LIST PALPATE_BUILT)
     # As another preset has built it: no source is compiled here but an empty one.
@@ -37,6 +38,9 @@ function(palpate_library name)
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
+  if(arg_WARM)
+    target_compile_options(${target} PRIVATE ${PALPATE_WARM_OPTIONS})
+  endif()
   if(arg_UNINSTALLED)
     target_compile_options(${target} PRIVATE ${PALPATE_COLD_OPTIONS})
   else()
