@@ -9,7 +9,7 @@
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
 # PALPATE_BUILT: libraries to take from the build folder PALPATE_BUILT_IN instead, with this folder's sources as they were there.
-# WARM: works beside ticks, and no loop over a body is in it.
+# WARM: works beside ticks, and not in them.
 # UNINSTALLED: for a program of ours only: commands, pages and windows, in which no tick runs.
 function(palpate_library name)
   cmake_parse_arguments(arg "UNINSTALLED;WARM" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})

@@ -126,6 +126,7 @@ public:
     Band(const NodeGrid& grid, std::span<const float> fraction, const Blur& blur)
         : grid_(grid),
           fraction_(fraction),
+          boxes_((grid.size + boxEdge - 1) / boxEdge),
           planes_(blur),
           toBack_(static_cast<float>(0.5 * blur.variance() + interpolated)),
           reach_(std::clamp(2.0F + 6.0F * static_cast<float>(blur.voxel), leastReach, farthestReach))
@@ -231,13 +232,11 @@ private:
 
     static constexpr int boxEdge = 4;  // [nodes]
 
-    Index3 boxes() const { return (grid_.size + boxEdge - 1) / boxEdge; }
     std::size_t boxOf(Index3 box) const
     {
         return static_cast<std::size_t>(box.x) +
-               static_cast<std::size_t>(boxes().x) *
-                   (static_cast<std::size_t>(box.y) +
-                    static_cast<std::size_t>(boxes().y) * static_cast<std::size_t>(box.z));
+               static_cast<std::size_t>(boxes_.x) *
+                   (static_cast<std::size_t>(box.y) + static_cast<std::size_t>(boxes_.y) * static_cast<std::size_t>(box.z));
     }
     // Of a place; of one outside of the grid the next box.
     Index3 boxAt(Vec3f at) const { return glm::clamp(Index3(glm::floor(at)), Index3(0), grid_.size - 1) / boxEdge; }
@@ -245,7 +244,7 @@ private:
     Boxes boxesOf(const std::vector<SurfacePoint>& points) const
     {
         Boxes boxed{PointColumns(points.size()), {}};
-        boxed.first.assign(boxOf(boxes() - 1) + 2, 0);
+        boxed.first.assign(boxOf(boxes_ - 1) + 2, 0);
         for (const SurfacePoint& point : points) {
             ++boxed.first[boxOf(boxAt(point.at)) + 1];
         }
@@ -306,12 +305,12 @@ private:
         return along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
     }
 
-    std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
+    std::optional<Paraboloid> through(const SurfacePoint& top, float reach) const
     {
-        Paraboloid paraboloid(found.points[k], reach);
+        Paraboloid paraboloid(top, reach);
         const Boxes& boxed = reach > widestOfAll ? sparse_ : all_;
-        const Index3 low = boxAt(found.points[k].at - reach);
-        const Index3 high = boxAt(found.points[k].at + reach);
+        const Index3 low = boxAt(top.at - reach);
+        const Index3 high = boxAt(top.at + reach);
         for (int z = low.z; z <= high.z; ++z) {
             for (int y = low.y; y <= high.y; ++y) {
                 paraboloid.add(boxed.points, boxed.first[boxOf({low.x, y, z})], boxed.first[boxOf({high.x, y, z}) + 1]);
@@ -323,11 +322,11 @@ private:
     // A point takes the paraboloid through the points around it, a narrower one where the surface is curved.
     void fit(const BlurredSurface& found, std::size_t k, BlurredSurface& fitted) const
     {
-        std::optional<Paraboloid> paraboloid = through(found, k, reach_);
+        std::optional<Paraboloid> paraboloid = through(found.points[k], reach_);
         const float narrow =
             paraboloid ? std::max(leastCurvedReach, 2.0F * turn / std::abs(paraboloid->bend())) : leastCurvedReach;
         if (narrow < 0.8F * reach_) {
-            paraboloid = through(found, k, narrow);
+            paraboloid = through(found.points[k], narrow);
         }
         if (paraboloid && std::abs(paraboloid->height()) < farthestShift) {
             fitted.points[k].at += paraboloid->height() * found.points[k].normal;
@@ -338,6 +337,7 @@ private:
 
     const NodeGrid& grid_;
     std::span<const float> fraction_;
+    Index3 boxes_;  // along each axis
     PlaneDepth planes_;
     float toBack_;  // in a bend of the surface
     float reach_;

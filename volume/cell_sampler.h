@@ -47,7 +47,8 @@ public:
         farthest_ = std::sqrt(3.0) * (0.5 * grid.spacing + std::max({voxel.x, voxel.y, voxel.z}));
         step_ = toIndex * grid.spacing;
         start_ = toIndex * (grid.origin - tissue.affine.origin);
-        findLines(s);
+        samples_ = s;
+        findEdges();
     }
 
     // Variance of the place in which visit() reads a node's cell, along each patient axis: of the samples, and of the hats
@@ -192,24 +193,21 @@ private:
     };
 
     // Where each axis of the voxels is parallel to one of the grid's, a sample's place along it depends on one index alone.
-    void findLines(int samples)
+    void findEdges()
     {
         for (int axis = 0; axis < 3; ++axis) {
             const Vec3 steps(step_[0][axis], step_[1][axis], step_[2][axis]);
             isAligned_ = isAligned_ && (steps.x != 0.0 ? 1 : 0) + (steps.y != 0.0 ? 1 : 0) + (steps.z != 0.0 ? 1 : 0) == 1;
-            for (int i = 0; i < samples; ++i) {
-                along_[static_cast<std::size_t>(axis)].push_back(glm::length(steps) * ((i + 0.5) / samples - 0.5));
-            }
+            edges_[axis] = glm::length(steps);
         }
     }
 
     Line lineOf(int axis, double centre) const
     {
         Line line;
-        const std::vector<double>& offsets = along_[static_cast<std::size_t>(axis)];
-        const double share = 1.0 / static_cast<double>(offsets.size());
-        for (const double offset : offsets) {
-            const double at = centre + offset;
+        const double share = 1.0 / samples_;
+        for (int i = 0; i < samples_; ++i) {
+            const double at = centre + edges_[axis] * ((i + 0.5) / samples_ - 0.5);
             const double low = std::floor(at);
             line.add(static_cast<int>(low), (1.0 - (at - low)) * share);
             if (at > low) {
@@ -300,13 +298,14 @@ private:
     mutable const openvdb::Int32* leaf_ = nullptr;
     mutable openvdb::Int32 tile_ = 0;
     openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
-    const TissueData* scaledBy_;                // null where no image scales the stiffness
-    Vec3 reach_{0.0};                           // of the samples along each axis [voxels]
-    std::vector<Vec3> offsets_;                 // samples of a cell, in voxels from the node
-    std::vector<Vec3> places_;                  // the same, -1 to 1 along each edge of the cell
-    std::array<std::vector<double>, 3> along_;  // of the samples along each axis of voxels, from the node, if isAligned_
-    bool isAligned_ = true;                     // the axes of voxels with those of the grid
-    std::vector<Vec3> inOctant_;                // samples of an eighth of a cell, in voxels from its middle
+    const TissueData* scaledBy_;  // null where no image scales the stiffness
+    Vec3 reach_{0.0};             // of the samples along each axis [voxels]
+    std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
+    std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
+    int samples_ = 1;             // along an edge of a cell
+    Vec3 edges_{0.0};             // of a cell along each axis of voxels [voxels], if isAligned_
+    bool isAligned_ = true;       // the axes of voxels with those of the grid
+    std::vector<Vec3> inOctant_;  // samples of an eighth of a cell, in voxels from its middle
     double farthest_ = 0.0;
     Mat3 step_{1.0};         // node steps in voxels
     Vec3 start_{0.0};        // node (0, 0, 0) in voxels

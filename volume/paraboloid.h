@@ -67,7 +67,7 @@ public:
             return false;
         }
         for (std::size_t i = 0; i < 6; ++i) {
-            right_[i] = sum(heights_[i]);
+            right_[i] = sum(heights_[degreeU[i]][degreeV[i]]);
             for (std::size_t j = 0; j <= i; ++j) {
                 matrix_[i][j] = sum(moments_[degreeU[i] + degreeU[j]][degreeV[i] + degreeV[j]]);
             }
@@ -169,20 +169,16 @@ private:
             for (std::size_t j = 0; j <= 4 - i; ++j, moment *= v) {
                 moments_[i][j] += moment;
                 if (i + j <= 2) {
-                    heights_[term(i, j)] += moment * w;
+                    heights_[i][j] += moment * w;
                 }
             }
         }
-    }
-    static constexpr std::size_t term(std::size_t i, std::size_t j)
-    {
-        return i + j == 2 ? 3 + j : i == 1 ? 1 : j == 1 ? 2 : 0;
     }
 
     Vec3f origin_, normal_, u_, v_;
     float reach_;
     std::array<std::array<Four, 5>, 5> moments_{};   // sums of weight u^i v^j
-    std::array<Four, 6> heights_{};                  // of weight w by each term
+    std::array<std::array<Four, 3>, 3> heights_{};   // of weight w u^i v^j
     FourMasks count_{};                              // less the number of points
     std::array<std::array<double, 6>, 6> matrix_{};  // lower triangle
     std::array<double, 6> right_{};
