@@ -15,6 +15,28 @@
 // Inside volume/ only.
 namespace palpate::volume {
 
+// What has weight, each once: at most `most` keys.
+template <typename Key, std::size_t most>
+struct Weights {
+    std::array<Key, most> keys;  // the first `count`
+    std::array<double, most> weights;
+    std::size_t count = 0;
+
+    void add(Key key, double weight)
+    {
+        std::size_t i = 0;
+        while (i < count && keys[i] != key) {
+            ++i;
+        }
+        if (i == count) {
+            keys[i] = key;
+            weights[i] = 0.0;
+            ++count;
+        }
+        weights[i] += weight;
+    }
+};
+
 // Reads the voxels that fill a node's cell, by s^3 samples of the cell, and interpolates between them: the nearest voxel
 // alone would shift everything by up to half a voxel where samples fall on the faces between voxels.
 class CellSampler {
@@ -172,25 +194,7 @@ private:
     static constexpr int mostSamples = 4;  // along an edge of a cell
 
     // The voxels along one of their axes that the samples of a cell read, each once, with their share.
-    struct Line {
-        std::array<int, 2 * mostSamples> voxels;
-        std::array<double, 2 * mostSamples> weights;
-        std::size_t count = 0;
-
-        void add(int voxel, double weight)
-        {
-            std::size_t i = 0;
-            while (i < count && voxels[i] != voxel) {
-                ++i;
-            }
-            if (i == count) {
-                voxels[i] = voxel;
-                weights[i] = 0.0;
-                ++count;
-            }
-            weights[i] += weight;
-        }
-    };
+    using Line = Weights<int, 2 * mostSamples>;
 
     // Where each axis of the voxels is parallel to one of the grid's, a sample's place along it depends on one index alone.
     void findEdges()
@@ -227,8 +231,8 @@ private:
             for (std::size_t j = 0; j < lines[1].count; ++j) {
                 const double weight = lines[2].weights[k] * lines[1].weights[j];
                 for (std::size_t i = 0; i < lines[0].count; ++i) {
-                    read({lines[0].voxels[i], lines[1].voxels[j], lines[2].voxels[k]}, weight * lines[0].weights[i],
-                         Vec3(0.0), visit);
+                    read({lines[0].keys[i], lines[1].keys[j], lines[2].keys[k]}, weight * lines[0].weights[i], Vec3(0.0),
+                         visit);
                 }
             }
         }

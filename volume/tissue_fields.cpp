@@ -342,32 +342,20 @@ void fillFromNearest(const NodeGrid& grid, std::vector<float>& values)
 // The row with most weight in a cell, air when less than half of it is tissue.
 std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lookup)
 {
-    std::array<std::uint8_t, 256> rows;  // as many as a table may have; the cell's first `count` are known
-    std::array<double, 256> weights;
-    std::size_t count = 0;
+    Weights<std::uint8_t, 256> rows;  // as many as a table may have
     double solid = 0;
     sampler.visitLabels(n, [&](std::uint16_t label, double weight) {
-        if (lookup.solid[label] == 0) {
-            return;
+        if (lookup.solid[label] != 0) {
+            solid += weight;
+            rows.add(lookup.row[label], weight);
         }
-        solid += weight;
-        const std::uint8_t row = lookup.row[label];
-        std::size_t i = 0;
-        while (i < count && rows[i] != row) {
-            ++i;
-        }
-        if (i == count) {
-            rows[i] = row;
-            weights[i] = 0.0;
-            ++count;
-        }
-        weights[i] += weight;
     });
     if (solid < 0.5 - 1e-9) {
         return 0;
     }
-    const auto most = std::max_element(weights.begin(), weights.begin() + static_cast<std::ptrdiff_t>(count));
-    return rows[static_cast<std::size_t>(most - weights.begin())];
+    const auto most =
+        std::max_element(rows.weights.begin(), rows.weights.begin() + static_cast<std::ptrdiff_t>(rows.count));
+    return rows.keys[static_cast<std::size_t>(most - rows.weights.begin())];
 }
 
 template <typename Scale>
