@@ -10,15 +10,17 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
-constexpr double maxStretch = 6.5;     // of the area under a tool
-constexpr double mostUnder = 0.2;      // of a tool's load, on nodes under the surface
-constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this fraction of its radius ...
+constexpr double smallStrain = 1.0;  // deepest that small strain is pressed, in the tool's radii
+constexpr double maxStretch = 6.5;   // of the area under a tool,
+constexpr double perCell = 1.7;      // but at most 1 and this for each cell of its radius, by the square of them up to this
+constexpr double mostUnder = 0.2;    // of a tool's load, on nodes under the surface
+constexpr double sinkRadii = 0.03;   // the surface sinks into a tool by at most this fraction of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
 constexpr double maxSink = 0.25;       // but not over this fraction of the radius
 constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness,
 constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius: from one on it would slip around the tool
-constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
+constexpr double ease = 0.11;        // by which a tool goes deeper per call, in its radii, by what is left of its limits,
+constexpr double swing = 0.2;        // and by the square where that is less than this
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr double still = 0.05;       // change of a tool's depth in a call that its patch does not follow, of the depth
 constexpr int maxSteps = 256;        // along a way through the tissue
@@ -86,7 +88,11 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     const double sink = std::min(sinkRadii * radius + sinkSpacings * spacing, maxSink * radius);
     const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
     const double squeezed = load > 0.0 ? under / (mostUnder * load) : 0.0;
-    const double further = std::min(bears - sunk, ease * radius * (maxStretch - std::max(stretch, maxStretch * squeezed)));
+    const double cells = radius / spacing;
+    const double bearable = std::min(1.0 + cells * std::min(cells, perCell), maxStretch);
+    const double left = 1.0 - std::max(std::max(stretch - 1.0, 0.0) / (bearable - 1.0), squeezed);
+    // The body answers some calls later: in proportion alone, a tool swings around its limit.
+    const double further = std::min(bears - sunk, ease * radius * left * std::min(std::abs(left) / swing, 1.0));
     // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
     // counts as far as it goes further in itself.
     stopped = stop * std::clamp(stopped / stop + wanted - given - behind, 0.0, wanted - free);

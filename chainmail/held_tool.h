@@ -8,8 +8,8 @@ namespace palpate::chainmail {
 /// A tool as an elastic body feels it: it presses only as deep as the cells bear. It is held back on its way,
 /// ElasticTool::pushed, where
 ///
-///     - the surface under it is stretched to six and a half times its area: from eight on, cells there have more than one
-///       equilibrium, and the surface slips around the tool
+///     - the surface under it is stretched to six and a half times its area, less under a tool of few cells: from eight on,
+///       cells there have more than one equilibrium, and the surface slips around the tool
 ///     - nodes under the surface bear a fifth of its load: from two fifths on it slips through the surface, onto them alone
 ///     - the surface sinks into it by more than a bound, and than a contact that is as stiff as may be
 ///     - small strain is pressed by more than a radius

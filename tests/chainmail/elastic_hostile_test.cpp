@@ -183,7 +183,7 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
 // a force where d comes to nothing, which that law has none for: there it goes on from a tenth of the radius.
 TEST(ElasticHostile, AForceAtNoDepthIsNotRaisedBeyondBounds)
 {
-    const auto body = tests::bodyOf(tests::heldBlock(Index3(12), 2e-3, 5e3, 0.45));
+    const auto body = tests::bodyOf(tests::heldBlock(Index3(24), 1e-3, 5e3, 0.45));
     constexpr double radius = 6e-3, whole = 20e-3;
     ElasticTool tool = tests::ball({0, 0, 0}, radius, 1e4);
     tool.pushed = {0, whole, 0};
