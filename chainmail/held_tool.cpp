@@ -20,7 +20,9 @@ constexpr double maxSink = 0.25;       // but not over this fraction of the radi
 constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness,
 constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius: from one on it would slip around the tool
 constexpr double ease = 0.11;        // by which a tool goes deeper per call, in its radii, by what is left of its limits,
-constexpr double swing = 0.2;        // and by the square where that is less than this
+constexpr double swing = 0.2;        // and by the square close to them, where less than this is left:
+constexpr double deeperBy = 1.0;     // as if its radius were at most so many cells;
+constexpr double backBy = 2.5;       // beyond a limit tissue slips around it, so it goes back faster
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr double still = 0.05;       // change of a tool's depth in a call that its patch does not follow, of the depth
 constexpr int maxSteps = 256;        // along a way through the tissue
@@ -92,7 +94,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     const double bearable = std::min(1.0 + cells * std::min(cells, perCell), maxStretch);
     const double left = 1.0 - std::max(std::max(stretch - 1.0, 0.0) / (bearable - 1.0), squeezed);
     // The body answers some calls later: in proportion alone, a tool swings around its limit.
-    const double further = std::min(bears - sunk, ease * radius * left * std::min(std::abs(left) / swing, 1.0));
+    const double near = std::min(radius, (left > 0.0 ? deeperBy : backBy) * spacing) * std::abs(left) / swing;
+    const double further = std::min(bears - sunk, ease * std::min(radius, near) * left);
     // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
     // counts as far as it goes further in itself.
     stopped = stop * std::clamp(stopped / stop + wanted - given - behind, 0.0, wanted - free);

@@ -60,6 +60,9 @@ TEST(DeepDrags, APlateThatIsPressedFlatIsFeltEvenly)
     for (const double radii : {0.8, 0.85, 0.95}) {
         dragDeep(body, {5.0, radii, 20e-6, 0.03, 0.2});
     }
+    for (const double radii : {0.4, 0.45}) {
+        dragDeep(body, {10.0, radii, 20e-6, 0.03, 0.2});
+    }
 }
 
 }  // namespace
