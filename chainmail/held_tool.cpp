@@ -121,7 +121,9 @@ double HeldTool::changed() const noexcept
 
 Vec3 HeldTool::ownForce() const noexcept
 {
-    return outward(std::pow(deeper, 1.5) * (felt - lag) - stopped * inward);
+    // Hertz: a ball's force grows with the depth to the power of 3/2, that of a cylinder on its side in proportion.
+    const double power = load > 0.0 ? 1.0 + 0.5 * std::min(onEnds / load, 1.0) : 1.5;
+    return outward(std::pow(deeper, power) * (felt - lag) - stopped * inward);
 }
 
 Vec3 HeldTool::outward(Vec3 force) const noexcept

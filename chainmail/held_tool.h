@@ -16,8 +16,9 @@ namespace palpate::chainmail {
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
 ///     - it would get into what is held in space: cells over bone that a tool would press flat bear next to nothing
 ///
-/// From there its force goes on by Hertz's law, with the depth to the power of 3/2. What is held in space stops the real
-/// tool besides, by a spring from where that begins.
+/// From there its force goes on by Hertz's law: with the depth to the power of 3/2 under a ball and the ends of a rod, in
+/// proportion to it under the side of a rod. What is held in space stops the real tool besides, by a spring from where that
+/// begins.
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]

@@ -200,6 +200,25 @@ TEST(ElasticHostile, AForceAtNoDepthIsNotRaisedBeyondBounds)
     }
 }
 
+// A rod on its side presses as a cylinder does, in proportion to its depth; on its ends it is a ball. By a ball's law a rod
+// of 1 mm, 10 mm deep, had three and a half times its force.
+TEST(ElasticHostile, TheForceOfARodOnItsSideGoesOnInProportion)
+{
+    const auto body = tests::bodyOf(tests::heldBlock(Index3(24), 1e-3, 5e3, 0.45));
+    ElasticTool tool = tests::ball({0, 0, 0}, 6e-3, 1e4);
+    tool.pushed = {0, 18e-3, 0};
+    for (const double onEnds : {0.0, 0.5, 1.0}) {
+        HeldTool held;
+        held.given = 9e-3;
+        held.stretch = 6.5;  // no further
+        held.load = 1.0;
+        held.onEnds = onEnds;
+        held.place(tool, body, false, true);
+        held.felt = {0, -1, 0};
+        EXPECT_NEAR(glm::length(held.force()), std::pow(2.0, 1.0 + 0.5 * onEnds), 1e-9) << onEnds;
+    }
+}
+
 TEST(ElasticHostile, TissueThatRelaxesStaysFiniteAndComesBack)
 {
     Rises rises;
