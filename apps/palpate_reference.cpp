@@ -348,8 +348,7 @@ void addOptions(CLI::App& app, ReferenceArguments& o)
     app.add_option("--tool", o.tool, "Sphere that presses: sphere_5mm or sphere_10mm")->capture_default_str();
     app.add_option(
            "--law", o.law,
-           "Material law: linear (small strain), or a law of finite strain, as in scenes, on CalculiX' neo-Hookean energy "
-           "(the kernel's differs below Poisson's ratio 0.49)")
+           "Material law: linear (small strain), or a law of finite strain, as in scenes, on CalculiX' neo-Hookean energy")
         ->check(CLI::IsMember(std::vector<std::string>(volume::lawNames.begin(), volume::lawNames.end())))
         ->capture_default_str();
     command::addChoice(app, "--elements", o.elements,

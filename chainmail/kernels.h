@@ -137,10 +137,9 @@ struct Kernels {
     void (*smoothOf)(const Layout& layout, CellStiffness stiffness, const Smoother& by, float* u, float* out,
                      float* scratch) noexcept;
 
-    /// As apply(), for a law of finite strain: the mean deformation gradient F of each cell goes through the stable
-    /// neo-Hookean energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim,
-    /// "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite
-    /// when a cell inverts, and what the law adds to it (volume/law.h). The other modes have the energy above
+    /// As apply(), for a law of finite strain: the mean deformation gradient F of each cell goes through the energy
+    /// W = mu/2 I + (lambda + 2/3 mu)/2 (J - 1)^2  with I of volume::isochoric(), which stays finite when a cell inverts,
+    /// and what the law adds to it (volume/law.h). The other modes have the energy above
     /// in axes that turn and stretch with the cell, F^T m for a mode m, so that a turn costs nothing; with relief r its
     /// component j is multiplied by 1 - 4/3 r (q y / (q^2 + y^2))^2, y = max(|F_j|^2 - 1, 0) for column j of F, q = 1.7.
     /// `inverse` is 1 / spacing [1/m].

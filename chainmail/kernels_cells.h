@@ -34,7 +34,7 @@ struct Linear {
     }
 };
 
-// Finite strain: stable neo-Hookean and what the law has beyond it, on the mean deformation gradient. With modes eight
+// Finite strain: the neo-Hookean energy and what the law has beyond it, on the mean deformation gradient. With modes eight
 // times their size F = I + m / (4 h), and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h
 // times the scaled stiffness.
 template <typename Law, typename Layer, typename Bending>
@@ -71,23 +71,23 @@ struct Finite {
         const Lanes minors = c[0][0] + c[1][1] + c[2][2];
         const Lanes determinant = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2];
         const Lanes volume = trace + minors + determinant;
-        const Lanes pressure = (lambda + mu) * volume;
         Lanes column[3];
 #pragma GCC unroll 3
         for (int j = 0; j < 3; ++j) {
             column[j] = f[0][j] * f[0][j] + f[1][j] * f[1][j] + f[2][j] * f[2][j];
         }
         const Lanes square = column[0] + column[1] + column[2];
-        Lanes shear = mu, pushed = pressure;
-        Lanes density = mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume;
+        const volume::Invariant<Lanes> stretch = volume::isochoric(square - 2.0F * (minors + determinant), volume);
+        const Lanes pressure = (lambda + (2.0F / 3.0F) * mu) * volume;
+        Lanes modulus = mu, density = 0.5F * (mu * stretch.i + pressure * volume);
         if constexpr (!std::is_same_v<Filled, Constant>) {
-            const volume::Invariant<Lanes> stretch = volume::isochoric(square - 2.0F * (minors + determinant), volume);
             const volume::Stiffening<Lanes> beyond =
                 Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, stretch.i);
-            shear += beyond.slope * stretch.byShape;
-            pushed += 0.5F * beyond.slope * stretch.byVolume;
+            modulus += beyond.slope;
             density += beyond.energy;
         }
+        const Lanes shear = modulus * stretch.byShape;
+        const Lanes pushed = pressure + 0.5F * modulus * stretch.byVolume;
         // shear (G - C) + pushed (I + C), C = tr G I - G^T + cof G the cofactor of F, less I. What a turn has in G and C
         // alike cancels before it is multiplied.
         const Lanes byShear = h8 * shear, byPushed = h8 * pushed;

@@ -124,8 +124,7 @@ LoadedBody::Outcome LoadedBody::solve(double tolerance, int most)
         const double length = newton.step();
         out.lastStep = length * newton.largest();
         out.residual = residual_;
-        out.balanced =
-            length >= 1.0 && out.lastStep <= tolerance && residual_ <= std::max(balanced, std::min(atMost, rounding()));
+        out.balanced = newton.largest() <= tolerance && residual_ <= std::max(balanced, std::min(atMost, rounding()));
     }
     return out;
 }

@@ -130,14 +130,11 @@ struct Exponential {
     }
 };
 
-/// A law of material. Small strain is one of its own; each other one is a neo-Hookean energy and what its beyond() adds.
-/// The kernel's energy is the stable one, mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2 (B. Smith, F. De Goes,
-/// T. Kim, "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018). The reference's is that of CalculiX,
-/// mu/2 (J^(-2/3) I_C - 3) + K/2 (J - 1)^2. They agree to 1 % from Poisson's ratio 0.49 on (docs/kernel.md). Its
-/// parameters are a tissue's Young's modulus, Poisson's ratio and stiffening b (TissueRow). A new law is a struct as these,
-/// and a place at the end of this list: scenes, the kernel, the reference and the planner go through it. `work` is what a
-/// node costs in a tick, in neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take I from
-/// isochoric().
+/// A law of material. Small strain is one of its own; each other one is the neo-Hookean energy
+/// mu/2 (J^(-2/3) I_C - 3) + K/2 (J - 1)^2, that of CalculiX, and what its beyond() adds. Its parameters are a tissue's
+/// Young's modulus, Poisson's ratio and stiffening b (TissueRow). A new law is a struct as these, and a place at the end of
+/// this list: scenes, the kernel, the reference and the planner go through it. `work` is what a node costs in a tick, in
+/// neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take I from isochoric().
 using Law = std::variant<SmallStrain, NeoHookean, Exponential>;
 inline constexpr std::size_t lawCount = std::variant_size_v<Law>;
 

@@ -42,7 +42,7 @@ TEST(ElasticFinite, RotationsCostNothing)
     }
 }
 
-// A homogeneous stretch F = diag(a, b, c): energy per volume by hand.
+// A homogeneous stretch F = diag(a, b, c): energy per volume by hand, that of CalculiX and of the reference.
 TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
 {
     const double mu = 2.0;
@@ -52,11 +52,11 @@ TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
     cells.fill(mu, lambda);
     cells.move([&](Index3 n) { return (stretch - 1.0) * Vec3(n); });
     const double j = stretch.x * stretch.y * stretch.z - 1.0;
-    const double density = 0.5 * mu * (glm::dot(stretch, stretch) - 3.0) - mu * j + 0.5 * (lambda + mu) * j * j;
+    const double i = std::pow(j + 1.0, -2.0 / 3.0) * glm::dot(stretch, stretch) - 3.0;
+    const double density = 0.5 * mu * i + 0.5 * (lambda + 2.0 / 3.0 * mu) * j * j;
     EXPECT_NEAR(cells.applyFinite(), density * 11 * 5 * 4, 1e-5 * density * 220);
 
     const double b = 7.0;
-    const double i = std::pow(j + 1.0, -2.0 / 3.0) * glm::dot(stretch, stretch) - 3.0;
     const double stiffer = density + 0.25 * mu * b * i * i;
     cells.stiffen(b);
     EXPECT_NEAR(cells.applyFinite(), stiffer * 220, 1e-4 * stiffer * 220);
@@ -210,23 +210,21 @@ TEST(ElasticFinite, AStretchedCellBendsByTheFactorThatIsSaid)
     }
 }
 
-// Cells turned inside out, flattened and blown up: finite energy and forces, and never under -mu^2 / 2 (lambda + mu) less
-// 3/2 mu per volume, the bound that W has over all deformation gradients.
+// Cells turned inside out, flattened and blown up: finite forces, and an energy that is finite and not negative.
 TEST(ElasticFinite, EnergyIsFiniteForInvertedCells)
 {
     std::minstd_rand random(4);
     Cells cells({11, 6, 7});
     cells.fill(2.0, 30.0);
-    const double least = -(0.5 * 4.0 / 32.0 + 3.0) * 10 * 5 * 6;
     for (const double size : {0.0, 0.5, 3.0, 50.0}) {
         cells.moveRandom(size, random);
-        EXPECT_GE(cells.applyFinite(), least);
+        EXPECT_GE(cells.applyFinite(), 0.0);
         EXPECT_TRUE(std::isfinite(cells.largestForce()));
     }
     cells.move([](Index3 n) { return -2.0 * Vec3(n); });
     EXPECT_GT(cells.applyFinite(), 0.0);
     cells.move([](Index3 n) { return -1.0 * Vec3(n); });
-    EXPECT_GE(cells.applyFinite(), least);
+    EXPECT_GE(cells.applyFinite(), 0.0);
 }
 
 }  // namespace

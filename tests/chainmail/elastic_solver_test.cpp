@@ -202,7 +202,7 @@ TEST(Elastic, PartsOfALoadEndWhereOneCallEnds)
         for (int i = 0; i < 56; ++i) {
             const std::array tools{pressed(1.5e-3)};
             const std::array ties{
-                tieAt(top + Vec3(3e-3, 5e-3, 0.0), (i % 7 == 0 ? 0.2e-3 : 0.02e-3) * i * Vec3(0, 1, 0.3))};
+                tieAt(top + Vec3(3e-3, 5e-3, 0.0), (i % 7 == 0 ? 0.18e-3 : 0.02e-3) * i * Vec3(0, 1, 0.3))};
             const auto load = tests::loadOf(tools, ties, top);
             const ElasticResult once = whole.relax(load);
             ElasticResult part = inParts.begin(load);

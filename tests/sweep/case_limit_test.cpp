@@ -8,6 +8,7 @@
 
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -23,7 +24,7 @@ SweepPlan springPlan(const std::string& more)
         "scene = \"block\"\noutputs = [\"force_n\"]\n"
         "[[axis]]\nkey = \"procedure.depth_mm\"\nvalues = [1, 2]\n"
         "[procedure]\nkind = \"press\"\nspeed_mm_s = 500\nhold_ms = 1\n"
-        "[set]\nvolume.voxel_mm = 3\nmodel.level = \"spring\"\n" +
+        "[set]\nvolume.voxel_mm = 2\nmodel.level = \"spring\"\n" +
             more,
         "plan.toml", namedScene);
 }
@@ -38,10 +39,11 @@ double secondsOf(CaseRunner& runner)
 // The session alone is far within the limit, whether its model is new or that of the reference is.
 TEST(CaseLimit, TakesInTheModelAndTheReference)
 {
-    for (const char* const reference : {"", "[reference]\nvolume.voxel_mm = 3.01\n"}) {
+    for (const char* const reference : {"", "[reference]\nvolume.voxel_mm = 2.01\n"}) {
         SweepPlan plan = springPlan(reference);
         CaseRunner first(plan, "one");
-        const double cold = secondsOf(first), warm = secondsOf(first);
+        const double cold = secondsOf(first);
+        const double warm = std::min({secondsOf(first), secondsOf(first), secondsOf(first)});  // other processes interrupt some
         ASSERT_LT(warm, cold / 4);
         plan.caseLimit = std::sqrt(cold * warm);
         CaseRunner runner(plan, "one");
