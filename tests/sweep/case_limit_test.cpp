@@ -43,7 +43,8 @@ TEST(CaseLimit, TakesInTheModelAndTheReference)
         SweepPlan plan = springPlan(reference);
         CaseRunner first(plan, "one");
         const double cold = secondsOf(first);
-        const double warm = std::min({secondsOf(first), secondsOf(first), secondsOf(first)});  // other processes interrupt some
+        const double warm =
+            std::min({secondsOf(first), secondsOf(first), secondsOf(first)});  // other processes interrupt some
         ASSERT_LT(warm, cold / 4);
         plan.caseLimit = std::sqrt(cold * warm);
         CaseRunner runner(plan, "one");
