@@ -112,8 +112,8 @@ TEST(ElasticDeep, ThreeRadiiDeepAndBackNothingPulls)
 
 // A cover of 3 mm over a hard lump stays between the lump and a ball that goes in by 1.4 radii, and no tool is held back:
 // the force grows all the way, and no node is inside the ball. With points of the surface alone nodes were in it from a
-// radius on, and the force ended. Of 24 places between nodes 18 hold to the end, 12 of them with
-// the stable neo-Hookean energy; in the others the cover is squeezed out from 7 mm on.
+// radius on, and the force ended. Of 24 places between nodes 18 hold to the end, with the
+// stable neo-Hookean energy 12 did; in the others the cover is squeezed out from 7 mm on.
 TEST(ElasticDeep, ASoftCoverIsNotSqueezedOutFromUnderABall)
 {
     constexpr double radius = 6e-3;

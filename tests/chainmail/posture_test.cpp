@@ -163,7 +163,7 @@ TEST(LoadedBody, WhatHoldsTheFixedNodesCarriesTheLoad)
             sum += Vec3(force, 2 * force, -force);
         }
     });
-    const auto outcome = loaded.solve(1e-7, 200);
+    const auto outcome = loaded.solve(1e-8, 200);
     EXPECT_TRUE(outcome.balanced);
     EXPECT_LT(glm::length(loaded.reaction() + sum), 5e-3 * glm::length(sum));
 }

@@ -41,8 +41,8 @@ std::array<double, 2> forcesIn(const haptics::SessionModel& body)
 
 // A ball of 10 mm beside finite elements: `palpate-reference SCENE --law neo-hookean --size 2.5 --mirrored xz --looks 5,10`
 // has the forces, the scene `block` with a table whose fat stiffens. With contacts as stiff as tissue is at rest, and I_C -
-// 3 - 2 (J - 1) for I, they were 2.5 and 7.9 % too low for b = 10, and 7.3 and 17 % for 40 (now 5.1; 4.6 while the cells of
-// the lump's surface had no membranes, which do not stiffen).
+// 3 - 2 (J - 1) for I, they were 2.5 and 7.9 % too low for b = 10, and 7.3 and 17 % for 40 (now 4.7; it was 4.6 while the
+// cells of the lump's surface had no membranes, which do not stiffen).
 TEST(PressStiffening, ForceIsThatOfFiniteElements)
 {
     struct Case {
