@@ -113,14 +113,16 @@ public:
         if (filled < least || std::abs(surface_.at(middle)) > 0.9 * edge_) {
             return 1.0;
         }
-        const double more = std::max(fractionBehind(surface_, middle, edge_), std::min(filled, sliver)) - filled;
+        const double behind = fractionBehind(surface_, middle, edge_);
+        const double more = (behind < blur ? 0.0 : std::max(behind, std::min(filled, sliver))) - filled;
         const double trust = std::clamp(3.0 - 2.0 * std::abs(more) / noise_, 0.0, 1.0);
         return 1.0 + trust * more / filled;
     }
 
 private:
-    static constexpr double least = 1e-6;  // fraction of a cell that may be none
-    static constexpr double sliver = 0.5;  // no emptier cell is made softer: its solution would need many cycles
+    static constexpr double least = 1e-6;   // fraction of a cell that may be none
+    static constexpr double sliver = 0.25;  // no emptier cell is made softer: its solution would need many cycles
+    static constexpr double blur = 0.02;    // with less behind the surface, tissue comes from samples between voxels alone
 
     const DistanceField& surface_;
     double edge_;   // of a cell [m]

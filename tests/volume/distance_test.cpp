@@ -420,7 +420,6 @@ TEST(Modulus, OfParallelAxesIsThatOfAxesTurnedByAlmostNothing)
     }
 }
 
-// A cell with bone is a layer of what is not bone, as much stiffer as it is thinner.
 // Cells that an oblique plane cuts are as full as it leaves them, and not as the steps of voxels do.
 TEST(Material, OfCellsThatAnObliquePlaneCutsIsAsTheSurfaceSays)
 {
@@ -457,6 +456,7 @@ TEST(Material, OfCellsThatAnObliquePlaneCutsIsAsTheSurfaceSays)
     EXPECT_LT(after, 0.6 * before);
 }
 
+// A cell with bone is a layer of what is not bone, as much stiffer as it is thinner.
 TEST(Material, OfACellThatIsPartlyHeldIsAThinnerLayer)
 {
     std::vector<LabelName> labels = names();
