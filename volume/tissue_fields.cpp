@@ -101,11 +101,11 @@ double fractionBehind(const DistanceField& surface, Vec3 middle, double edge)
 // What the surface makes of the stiffness of a cell of which the voxels fill `filled`.
 class SurfaceCells {
 public:
-    SurfaceCells(const DistanceField& surface, const NodeGrid& cells, Vec3 voxel)
-        : surface_(surface),
-          edge_(cells.spacing),
-          noise_(std::min(0.3 * std::max({voxel.x, voxel.y, voxel.z}) / cells.spacing, 0.5))
+    SurfaceCells(const DistanceField& surface, const NodeGrid& cells, const Affine& voxels)
+        : surface_(surface), voxels_(voxels.linear), edge_(cells.spacing)
     {
+        const Vec3 voxel = voxels.spacing();
+        noise_ = std::min(0.3 * std::max({voxel.x, voxel.y, voxel.z}) / edge_, 0.5);
     }
 
     double scale(Vec3 middle, double filled) const
@@ -114,17 +114,32 @@ public:
             return 1.0;
         }
         const double behind = fractionBehind(surface_, middle, edge_);
-        const double more = (behind < blur ? 0.0 : std::max(behind, std::min(filled, sliver))) - filled;
+        double wanted = std::max(behind, std::min(filled, half));
+        if (behind < wanted && isThickAt(middle)) {
+            wanted = behind < blur ? 0.0 : std::max(behind, std::min(filled, sliver));
+        }
+        const double more = wanted - filled;
         const double trust = std::clamp(3.0 - 2.0 * std::abs(more) / noise_, 0.0, 1.0);
         return 1.0 + trust * more / filled;
     }
 
 private:
-    static constexpr double least = 1e-6;   // fraction of a cell that may be none
-    static constexpr double sliver = 0.25;  // no emptier cell is made softer: its solution would need many cycles
-    static constexpr double blur = 0.02;    // with less behind the surface, tissue comes from samples between voxels alone
+    static constexpr double least = 1e-6;  // fraction of a cell that may be none
+    // No emptier cell is made softer, since its solution would need many cycles: in thin parts, and elsewhere.
+    static constexpr double half = 0.5, sliver = 0.25;
+    static constexpr double blur = 0.02;  // with less behind the surface, tissue comes from samples between voxels alone
+
+    // Whether the surface is that of a part of over two voxels. It does not know thinner ones, or makes them thinner.
+    bool isThickAt(Vec3 middle) const
+    {
+        constexpr double inside = 0.9, deep = 0.75;  // of a voxel
+        const Vec3 n = surface_.normal(middle);
+        const double voxel = glm::dot(glm::abs(n * voxels_), Vec3(1.0));
+        return surface_.at(middle - (surface_.at(middle) + inside * voxel) * n) < -deep * voxel;
+    }
 
     const DistanceField& surface_;
+    Mat3 voxels_;   // their edges [m]
     double edge_;   // of a cell [m]
     double noise_;  // what the steps of voxels do to a fraction
 };
@@ -441,7 +456,7 @@ std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
 
 std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid, const DistanceField& surface) const
 {
-    const SurfaceCells cells(surface, grid, impl_->affine.spacing());
+    const SurfaceCells cells(surface, grid, impl_->affine);
     return materials(*impl_, grid, [&](Vec3 at, double filled) { return cells.scale(at, filled); });
 }
 

@@ -371,6 +371,32 @@ TEST(TissueCells, HoldASlabOfAnyVoxels)
     }
 }
 
+// A flap of a single layer of voxels, which the surface's blur does not know, stays as thick as its voxels say.
+TEST(TissueCells, KeepAFlapOfOneVoxel)
+{
+    const Vec3 voxel(0.7e-3, 0.7e-3, 3e-3);
+    const Index3 size(86, 86, 30);
+    LabelImage image{size, bodies::centred({Mat3(voxel.x, 0, 0, 0, voxel.y, 0, 0, 0, voxel.z), Vec3(0.0)}, size), {}};
+    image.values.assign(image.offset({0, 0, size.z}), 0);
+    forEachIndex({14, 14, 5}, {42, 71, 24}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+    forEachIndex({43, 43, 5}, {71, 43, 24}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+    const Tissue tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+    const DistanceField surface = tissue.distanceToBody(coveringGrid(tissue.box(), 0.75e-3, 3e-3));
+    for (const double spacing : {1.5e-3, 2e-3}) {
+        for (const double beside : {3e-3, 6e-3, 15e-3}) {
+            const NodeGrid cells{{2, 13, 2}, Vec3(beside, -6.5 * spacing, 0.0), spacing};
+            const auto voxels = tissue.materialOn(cells), cut = tissue.materialOn(cells, surface);
+            double all = 0.0, left = 0.0;
+            for (int j = 0; j < cells.size.y; ++j) {
+                all += static_cast<double>(voxels[cells.offset({0, j, 0})].youngsModulus);
+                left += static_cast<double>(cut[cells.offset({0, j, 0})].youngsModulus);
+            }
+            EXPECT_GT(all, 0.0);
+            EXPECT_NEAR(left, all, 0.1 * all) << spacing << " " << beside;
+        }
+    }
+}
+
 // Of voxels far larger than cells, too, the face is in the middle between the last full and the first empty one: a cell
 // beyond it has nothing. Interpolated as they are, cells were partly full up to half a voxel outside.
 TEST(TissueCells, NothingLiesOutsideOfCoarseVoxels)
