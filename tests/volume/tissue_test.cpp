@@ -344,7 +344,7 @@ TEST(TissueCells, AreAsFullAsTheBodyIsInThem)
 }
 
 // Cells of any size hold as much of a slab as there is of it, wherever its faces lie in them. Samples lie between voxels,
-// of which those beside a face gave cells outside of it up to a sixth of a voxel: plates were up to 36 % too stiff.
+// of which those beside a face gave cells outside of it up to a sixth of a voxel: plates were up to 23 % too stiff.
 TEST(TissueCells, HoldASlabOfAnyVoxels)
 {
     for (const auto& [voxel, layers] :
