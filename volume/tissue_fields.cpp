@@ -110,12 +110,13 @@ public:
 
     double scale(Vec3 middle, double filled) const
     {
-        if (filled < least || std::abs(surface_.at(middle)) > 0.9 * edge_) {
+        const double distance = surface_.at(middle);
+        if (filled < least || std::abs(distance) > 0.9 * edge_) {
             return 1.0;
         }
         const double behind = fractionBehind(surface_, middle, edge_);
         double wanted = std::max(behind, std::min(filled, half));
-        if (behind < wanted && isThickAt(middle)) {
+        if (behind < wanted && isThickAt(middle, distance)) {
             wanted = behind < blur ? 0.0 : std::max(behind, std::min(filled, sliver));
         }
         const double more = wanted - filled;
@@ -130,12 +131,12 @@ private:
     static constexpr double blur = 0.02;  // with less behind the surface, tissue comes from samples between voxels alone
 
     // Whether the surface is that of a part of over two voxels. It does not know thinner ones, or makes them thinner.
-    bool isThickAt(Vec3 middle) const
+    bool isThickAt(Vec3 middle, double distance) const
     {
         constexpr double inside = 0.9, deep = 0.75;  // of a voxel
         const Vec3 n = surface_.normal(middle);
         const double voxel = glm::dot(glm::abs(n * voxels_), Vec3(1.0));
-        return surface_.at(middle - (surface_.at(middle) + inside * voxel) * n) < -deep * voxel;
+        return surface_.at(middle - (distance + inside * voxel) * n) < -deep * voxel;
     }
 
     const DistanceField& surface_;
