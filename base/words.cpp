@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <clocale>
+#include <cstddef>
 #include <cstdlib>
 #include <utility>
 
@@ -49,7 +50,9 @@ std::string asked()
     return "en";
 }
 
-thread_local bool isEnglish = false;
+// Aligned for mold 1.10: it starts GNU_RELRO at what is local to threads, and a program where that lies before the last
+// bytes of a page ends cannot be loaded ("cannot apply additional memory protection").
+alignas(std::max_align_t) thread_local bool isEnglish = false;
 std::atomic<bool> chosen = false;  // a language, by useLanguage()
 
 }  // namespace
