@@ -20,7 +20,7 @@ struct LackingAt {
     double square = 0;
     double product = 0;
 };
-constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
+constexpr std::array<LackingAt, 21> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
                                              {0.2, 0.162, 0.16, 0.79, -0.72},
                                              {0.25, 0.170, 0.15, 1.07, -0.81},
                                              {0.3, 0.178, 0.15, 1.44, -0.85},
@@ -35,8 +35,11 @@ constexpr std::array<LackingAt, 18> lacking{{{0.15, 0.102, 0.07, 0.31, -0.25},
                                              {1.0, 0.075, -0.04, -0.45, 0.22},
                                              {1.1, 0.060, -0.05, -0.55, 0.30},
                                              {1.25, 0.042, -0.06, -0.15, 0.21},
-                                             {1.5, 0.021, -0.14, 0.49, 0.42},
-                                             {1.75, 0.007, -0.10, 0.40, 0.27},
+                                             {1.4, 0.029, -0.084, 0.367, 0.046},
+                                             {1.5, 0.021, 0.011, 0.434, -0.114},
+                                             {1.6, 0.0154, 0.054, 0.386, -0.129},
+                                             {1.75, 0.007, -0.026, 0.604, -0.068},
+                                             {1.9, 0.0028, -0.013, 0.111, -0.103},
                                              {2.0, 0.0, 0.0, 0.0, 0.0}}};
 
 LackingAt lackingAt(double radius) noexcept
@@ -226,9 +229,11 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     const Vec3 lying = a - b - ahead * inward;
     const double isRound =
         std::clamp(std::max(std::abs(ahead) / depth, 1.0 - glm::length(lying) / radiusOfPatch(tool)), 0.0, 1.0);
+    // What was measured is a ball on a half-space: less so from half a radius on, and no more at a radius.
+    const double known = isRound * std::clamp(2.0 - 2.0 * depth / tool.shape.widest(), 0.0, 1.0);
     const double sum = glm::dot(across, f), square = glm::dot(across, f * f);
-    return {glm::mix(mean.sum, sum, isRound), glm::mix(mean.square, square, isRound),
-            glm::mix(mean.product, 0.5 * (sum * sum - square), isRound)};
+    return {glm::mix(mean.sum, sum, known), glm::mix(mean.square, square, known),
+            glm::mix(mean.product, 0.5 * (sum * sum - square), known)};
 }
 
 ResolvedShare::ResolvedShare(double radiusInCells, double between, const Between& across) noexcept

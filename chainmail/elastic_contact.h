@@ -260,7 +260,7 @@ struct Between {
     double product = 1.0 / 36.0;  // of both
 };
 /// Of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat, unless it is
-/// shorter than its patch.
+/// shorter than its patch, and for a tool that is a radius deep.
 Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
 
 /// By what cells around a point lack other compliance than those of the finest level that are full of soft tissue.
