@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -39,29 +40,42 @@ std::vector<double> forcesOf(const ElasticBody& body, double radius, Vec3 place,
     return forces;
 }
 
-// Over a node, between nodes, and on the way from one to the other. With what cells lack taken under a patch as wide as a
-// larger ball's, places differed by up to 13 %.
+// Largest over smallest force at each depth, of five places: over a node, between nodes, and on the way from one to the
+// other.
+std::vector<double> unevenness(const ElasticBody& body, double radius, const std::vector<double>& depths)
+{
+    std::vector<double> least(depths.size(), 1e9), most(depths.size(), 0.0);
+    for (const Vec3 place : {Vec3(0), Vec3(0.25, 0, 0.25), Vec3(0.5, 0, 0), Vec3(0.5, 0, 0.25), Vec3(0.5, 0, 0.5)}) {
+        const auto forces = forcesOf(body, radius, place, depths);
+        for (std::size_t i = 0; i < forces.size(); ++i) {
+            least[i] = std::min(least[i], forces[i]);
+            most[i] = std::max(most[i], forces[i]);
+        }
+    }
+    std::transform(most.begin(), most.end(), least.begin(), most.begin(), std::divides<>());
+    return most;
+}
+
+// With what cells lack taken under a patch as wide as a larger ball's, places differed by up to 13 %.
 TEST(SmallBalls, FeelTheSameOverNodesAndBetweenThem)
 {
-    const std::array<Vec3, 5> places{Vec3(0), Vec3(0.25, 0, 0.25), Vec3(0.5, 0, 0), Vec3(0.5, 0, 0.25), Vec3(0.5, 0, 0.5)};
     for (const int thickness : {6, 20}) {
         const ElasticBody body = fat(thickness);
         for (const double cells : {1.25, 1.5, 1.75}) {
             const double radius = cells * cellEdge;
-            std::vector<double> depths{0.1 * radius, 0.2 * radius, 0.3 * radius, 0.4 * radius};
-            std::vector<double> least(depths.size(), 1e9), most(depths.size(), 0.0);
-            for (const Vec3 place : places) {
-                const auto forces = forcesOf(body, radius, place, depths);
-                for (std::size_t i = 0; i < forces.size(); ++i) {
-                    least[i] = std::min(least[i], forces[i]);
-                    most[i] = std::max(most[i], forces[i]);
-                }
-            }
-            for (std::size_t i = 0; i < depths.size(); ++i) {
-                EXPECT_LT(most[i] / least[i], 1.06) << cells << " cells, depth " << depths[i] / radius << " radii";
-            }
+            const auto uneven = unevenness(body, radius, {0.1 * radius, 0.2 * radius, 0.3 * radius, 0.4 * radius});
+            EXPECT_LT(*std::ranges::max_element(uneven), 1.06) << cells << " cells";
         }
     }
+}
+
+// The same of a ball of five cells that touches 1.4 to 1.8 cells: with less than what was measured there 3.0 %.
+TEST(SmallBalls, SoDoesALargeOneThatTouchesOverACell)
+{
+    constexpr double radius = 5.0 * cellEdge;
+    const auto depth = [](double cells) { return cells * cells * cellEdge * cellEdge / radius; };
+    const auto uneven = unevenness(fat(20), radius, {depth(1.4), depth(1.5), depth(1.6), depth(1.7), depth(1.8)});
+    EXPECT_LT(*std::ranges::max_element(uneven), 1.025);
 }
 
 // Neighbours are in different parts. Sites are looked for anew when two parts have changed: a hand that trembles stays with
