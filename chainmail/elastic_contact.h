@@ -278,8 +278,9 @@ struct Lacking {
 ///     c = m + g (sum - 1/3) + q (square - 1/15) + x (product - 1/36)
 ///     share = 1 / (1 + 20 c)
 ///
-/// m, g, q and x are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.47) needs
-/// on grids shifted along the surface and across it; `palpate accuracy --verify` has the errors that are left.
+/// m, g, q and x are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.47, from 1.4
+/// cells on 0.45) needs on grids shifted along the surface and across it; `palpate accuracy --verify` has the errors that
+/// are left.
 ///
 /// A point in a wider window lies in cells that are wider than h, and lack as many times the compliance. Tissue with nu
 /// under 0.47 lacks 0.6 (0.47 - nu) h / E more, where E is 2.9 mu, and less than that under 1/4 and over 2 cells; its g, q
