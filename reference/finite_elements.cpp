@@ -444,6 +444,9 @@ void FiniteElements::setMultipliers(std::vector<double> multipliers)
 
 std::vector<Vec3> FiniteElements::displacementAt(const std::vector<double>& state, std::span<const Vec3> rest) const
 {
+    if (rest.empty()) {
+        return {};  // which GetFEM refuses
+    }
     getfem::mesh_trans_inv points(impl_->mesh);
     for (const Vec3& p : rest) {
         points.add_point(bgeot::base_node(p.x, p.y, p.z));

@@ -177,6 +177,37 @@ public:
         return static_cast<std::uint8_t>(found);
     }
 
+    // Fraction of a node's cell in which more than half of what lies between voxels is tissue: what the faces of voxels
+    // along the axes enclose, wherever the cell lies. 4^3 parts, each from empty to full over its edge.
+    template <typename IsTissue>
+    double insideFaces(Index3 n, const IsTissue& isTissue) const
+    {
+        constexpr int side = 4;
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        double sum = 0.0;
+        forEachIndex(Index3(0), Index3(side - 1), [&](Index3 part) {
+            const Vec3 at = centre + step_ * ((Vec3(part) + 0.5) / static_cast<double>(side) - 0.5);
+            double tissue = 0.0;
+            Vec3 slope(0.0);
+            const Vec3 low = glm::floor(at), t = at - low;
+            const std::array<Vec3, 2> w{1.0 - t, t};
+            for (std::size_t corner = 0; corner < 8; ++corner) {
+                const std::array<std::size_t, 3> far{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
+                read(Index3(low) + Index3(far[0], far[1], far[2]), 1.0, Vec3(0.0), [&](std::uint16_t label, double) {
+                    if (isTissue(label)) {
+                        const Vec3 share(w[far[0]].x, w[far[1]].y, w[far[2]].z);
+                        const Vec3 up = 2.0 * Vec3(far[0], far[1], far[2]) - 1.0;
+                        tissue += share.x * share.y * share.z;
+                        slope += up * Vec3(share.y * share.z, share.x * share.z, share.x * share.y);
+                    }
+                });
+            }
+            const double steepness = glm::length(slope * step_) / side;  // over a part's edge
+            sum += steepness > 1e-9 ? std::clamp(0.5 + (tissue - 0.5) / steepness, 0.0, 1.0) : (tissue < 0.5 ? 0.0 : 1.0);
+        });
+        return sum / (side * side * side);
+    }
+
     // What the image makes of the modulus of a voxel's tissue.
     double factor(std::uint16_t label, const openvdb::Coord& voxel) const
     {

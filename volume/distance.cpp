@@ -196,6 +196,18 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
     return distances(grid, points, nearest, [&](Index3, std::size_t i, const SurfacePoint*) { return fraction[i] > iso; });
 }
 
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso,
+                                  std::span<const std::uint8_t> marked)
+{
+    std::vector<std::int32_t> nearest(grid.count(), -1);
+    const std::vector<SurfacePoint> points = collectSurface({grid, fraction}, iso, nearest);
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+        nearest[i] = marked[i] != 0 ? nearest[i] : -1;
+    }
+    return distances(grid, points, nearest,
+                     [&](Index3, std::size_t i, const SurfacePoint*) { return marked[i] != 0 && fraction[i] > iso; });
+}
+
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
                                   float weight)
 {

@@ -25,6 +25,11 @@ void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vecto
 /// 1). Where no surface crosses the grid, the diagonal of the grid with the sign of the side it lies on.
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso);
 
+/// The same to the surface next to marked nodes alone; negative at no other.
+/// @param marked  1 (nodes x 1)
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso,
+                                  std::span<const std::uint8_t> marked);
+
 /// The same to a surface from fractions, of which more than half are inside.
 /// @param weight  of the surface's way back: 1 as it was computed
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,

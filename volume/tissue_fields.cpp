@@ -2,6 +2,8 @@
 #include <volume/cell_mixture.h>
 #include <volume/cell_sampler.h>
 #include <volume/distance.h>
+#include <volume/surface_cells.h>
+#include <volume/thin_parts.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -84,66 +86,6 @@ CellMixture cellMixture(const TissueData& tissue, const CellSampler& sampler, In
     });
     return mixture;
 }
-
-// Fraction of a cell behind the surface: the mean of 4^3 parts, each from empty to full over its edge.
-double fractionBehind(const DistanceField& surface, Vec3 middle, double edge)
-{
-    constexpr int side = 4;
-    const double part = edge / side;
-    double sum = 0.0;
-    forEachIndex(Index3(0), Index3(side - 1), [&](Index3 n) {
-        const Vec3 at = middle + part * (Vec3(n) + 0.5 - 0.5 * side);
-        sum += std::clamp(0.5 - surface.at(at) / part, 0.0, 1.0);
-    });
-    return sum / (side * side * side);
-}
-
-// What the surface makes of the stiffness of a cell of which the voxels fill `filled`.
-class SurfaceCells {
-public:
-    SurfaceCells(const DistanceField& surface, const NodeGrid& cells, const Affine& voxels)
-        : surface_(surface), voxels_(voxels.linear), edge_(cells.spacing)
-    {
-        const Vec3 voxel = voxels.spacing();
-        noise_ = std::min(0.3 * std::max({voxel.x, voxel.y, voxel.z}) / edge_, 0.5);
-    }
-
-    double scale(Vec3 middle, double filled) const
-    {
-        const double distance = surface_.at(middle);
-        if (filled < least || std::abs(distance) > 0.9 * edge_) {
-            return 1.0;
-        }
-        const double behind = fractionBehind(surface_, middle, edge_);
-        double wanted = std::max(behind, std::min(filled, half));
-        if (behind < wanted && isThickAt(middle, distance)) {
-            wanted = behind < blur ? 0.0 : std::max(behind, std::min(filled, sliver));
-        }
-        const double more = wanted - filled;
-        const double trust = std::clamp(3.0 - 2.0 * std::abs(more) / noise_, 0.0, 1.0);
-        return 1.0 + trust * more / filled;
-    }
-
-private:
-    static constexpr double least = 1e-6;  // fraction of a cell that may be none
-    // No emptier cell is made softer, since its solution would need many cycles: in thin parts, and elsewhere.
-    static constexpr double half = 0.5, sliver = 0.25;
-    static constexpr double blur = 0.02;  // with less behind the surface, tissue comes from samples between voxels alone
-
-    // Whether the surface is that of a part of over two voxels. It does not know thinner ones, or makes them thinner.
-    bool isThickAt(Vec3 middle, double distance) const
-    {
-        constexpr double inside = 0.9, deep = 0.75;  // of a voxel
-        const Vec3 n = surface_.normal(middle);
-        const double voxel = glm::dot(glm::abs(n * voxels_), Vec3(1.0));
-        return surface_.at(middle - (distance + inside * voxel) * n) < -deep * voxel;
-    }
-
-    const DistanceField& surface_;
-    Mat3 voxels_;   // their edges [m]
-    double edge_;   // of a cell [m]
-    double noise_;  // what the steps of voxels do to a fraction
-};
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)
 {
@@ -246,6 +188,16 @@ Blur blurOf(const TissueData& tissue, const NodeGrid& grid, Index3 passes)
             std::max({voxel.x, voxel.y, voxel.z}) / grid.spacing};
 }
 
+// Fractions of cells, smoothed so that steps are not felt.
+std::vector<float> smoothed(std::vector<float> fraction, const NodeGrid& grid, const NodeRange& range, Index3 passes)
+{
+    const NodeRange reached = grown(range, grid, passes);
+    for (int axis = 0; axis < 3; ++axis) {
+        smoothAxis(fraction, grid, reached, axis, passes[axis]);
+    }
+    return fraction;
+}
+
 bool inside(const Box& box, const Box& of)
 {
     return glm::all(glm::greaterThan(box.low, of.low)) && glm::all(glm::lessThan(box.high, of.high));
@@ -266,12 +218,43 @@ DistanceField distanceToBox(const NodeGrid& grid, const Box& box)
     return field;
 }
 
-DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, const std::vector<std::uint8_t>& wanted)
+// To what has no thin parts.
+// volume: of its voxels [m^3]
+DistanceField distanceToSurface(const NodeGrid& grid, const std::vector<float>& blurred, const Blur& blur, double volume)
+{
+    const BlurredSurface surface = blurredSurface(grid, blurred, blur);
+    const double shell = surface.shell * std::pow(grid.spacing, 3) / volume;
+    Enclosed enclosed = shell > tooThin ? Enclosed{} : enclosedBy(grid, blurred, surface);
+    const double missing = 1.0 - enclosed.volume / volume;
+    if (std::abs(missing) > tooThin || shell > tooThin) {
+        DistanceField field{{grid, signedDistance(grid, blurred, isoForVolume(grid, blurred, volume))}};
+        keepVolume(grid, field.values, volume);
+        return field;
+    }
+    if (std::abs(missing) > exact && shell > exact) {
+        // The way back is of first order: on bodies that are curved all over, their volume says how much of it is due.
+        const double weight = std::clamp(1.0 + missing / shell, 0.75, 1.25);
+        return {{grid, signedDistance(grid, blurred, surface, static_cast<float>(weight))}};
+    }
+    return {
+        {grid, enclosed.distance.empty() ? signedDistance(grid, blurred, surface, 1.0F) : std::move(enclosed.distance)}};
+}
+
+// Whether nodes miss nothing that is a voxel thick.
+bool isAsFineAsVoxels(const TissueData& tissue, const NodeGrid& grid)
+{
+    const Vec3 voxel = tissue.affine.spacing();
+    return grid.spacing < (1.0 + 1e-6) * std::min({voxel.x, voxel.y, voxel.z});
+}
+
+// keepsThin: parts of a voxel are as thick as that.
+DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, const std::vector<std::uint8_t>& wanted,
+                               bool keepsThin)
 {
     const IndexBox extent = tissue.extentOf(wanted);
     const Box box = patientBox(tissue.affine, extent);
     const NodeRange range = nodesAround(tissue, grid, extent);
-    std::vector<float> fraction = fractionOf(tissue, grid, range, wanted);
+    const std::vector<float> fraction = fractionOf(tissue, grid, range, wanted);
     if (*std::max_element(fraction.begin(), fraction.end()) <= 0.0F) {
         return distanceToBox(grid, box);
     }
@@ -282,27 +265,21 @@ DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, c
             volume += wanted[s.value] != 0 ? s.volume : 0.0;
         }
     }
-    const Index3 passes = smoothingPasses(tissue, grid);
-    const NodeRange smoothed = grown(range, grid, passes);
-    for (int axis = 0; axis < 3; ++axis) {
-        smoothAxis(fraction, grid, smoothed, axis, passes[axis]);
+    const Blur blur = blurOf(tissue, grid, smoothingPasses(tissue, grid));
+    const std::vector<float> blurred = smoothed(fraction, grid, range, blur.passes);
+    const bool findsThin = keepsThin && isAsFineAsVoxels(tissue, grid);
+    const ThinParts thin = findsThin ? thinParts(grid, fraction, blurred, blur.voxel) : ThinParts{};
+    if (thin.around.empty()) {
+        return distanceToSurface(grid, blurred, blur, volume);
     }
-    const BlurredSurface surface = blurredSurface(grid, fraction, blurOf(tissue, grid, passes));
-    const double shell = surface.shell * std::pow(grid.spacing, 3) / volume;
-    Enclosed enclosed = shell > tooThin ? Enclosed{} : enclosedBy(grid, fraction, surface);
-    const double missing = 1.0 - enclosed.volume / volume;
-    if (std::abs(missing) > tooThin || shell > tooThin) {
-        DistanceField field{{grid, signedDistance(grid, fraction, isoForVolume(grid, fraction, volume))}};
-        keepVolume(grid, field.values, volume);
-        return field;
+    const double rest = volume - integral(grid, fraction) + integral(grid, thin.rest);
+    DistanceField field{
+        {grid, std::vector<float>(grid.count(), static_cast<float>(glm::length(grid.box().high - grid.box().low)))}};
+    if (*std::max_element(thin.rest.begin(), thin.rest.end()) > 0.5F) {
+        field = distanceToSurface(grid, smoothed(thin.rest, grid, range, blur.passes), blur, rest);
     }
-    if (std::abs(missing) > exact && shell > exact) {
-        // The way back is of first order: on bodies that are curved all over, their volume says how much of it is due.
-        const double weight = std::clamp(1.0 + missing / shell, 0.75, 1.25);
-        return {{grid, signedDistance(grid, fraction, surface, static_cast<float>(weight))}};
-    }
-    return {
-        {grid, enclosed.distance.empty() ? signedDistance(grid, fraction, surface, 1.0F) : std::move(enclosed.distance)}};
+    addThinParts(grid, fraction, thin, field.values);
+    return field;
 }
 
 void checkGrid(const NodeGrid& grid)
@@ -398,7 +375,9 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 if (mixture.fraction() < full) {
                     cell.octants = sampler.octants(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
                 }
-                const auto scaled = static_cast<float>(scale(at, mixture.fraction()));
+                const auto scaled = static_cast<float>(scale(at, mixture.fraction(), [&] {
+                    return sampler.insideFaces(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
+                }));
                 cell.youngsModulus *= scaled;
                 cell.fraction = std::min(scaled * cell.fraction, 1.0F);
             }
@@ -421,14 +400,14 @@ DistanceField Tissue::distanceTo(std::span<const std::uint16_t> labels, const No
         throw base::error("no voxel has {}",
                           labels.size() == 1 ? fmt::format("label {}", labels[0]) : "one of the labels asked for");
     }
-    return distanceToMarked(*impl_, grid, wanted);
+    return distanceToMarked(*impl_, grid, wanted, false);
 }
 
 DistanceField Tissue::distanceToBody(const NodeGrid& grid) const
 {
     checkGrid(grid);
     base::failIf(impl_->extentOf(impl_->lookup.solid).empty(), "the volume holds no tissue, only air");
-    return distanceToMarked(*impl_, grid, impl_->lookup.solid);
+    return distanceToMarked(*impl_, grid, impl_->lookup.solid, true);
 }
 
 ScalarField Tissue::youngsModulusOn(const NodeGrid& grid) const
@@ -452,13 +431,14 @@ ScalarField Tissue::youngsModulusOn(const NodeGrid& grid) const
 
 std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
 {
-    return materials(*impl_, grid, [](Vec3, double) { return 1.0; });
+    return materials(*impl_, grid, [](Vec3, double, const auto&) { return 1.0; });
 }
 
 std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid, const DistanceField& surface) const
 {
     const SurfaceCells cells(surface, grid, impl_->affine);
-    return materials(*impl_, grid, [&](Vec3 at, double filled) { return cells.scale(at, filled); });
+    return materials(*impl_, grid,
+                     [&](Vec3 at, double filled, const auto& insideFaces) { return cells.scale(at, filled, insideFaces); });
 }
 
 std::vector<std::uint8_t> Tissue::tissueOn(const NodeGrid& grid) const
