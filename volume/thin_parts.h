@@ -22,7 +22,7 @@ struct ThinParts {
 ///
 /// @param fraction  of each node's cell (nodes x 1)
 /// @param blurred   the same, smoothed
-/// @param voxel     longest edge [spacings]; no edge may be shorter than a spacing, or nodes miss parts
+/// @param voxel     longest edge [spacings]; parts thinner than a spacing are not found, or with holes
 ThinParts thinParts(const NodeGrid& grid, std::span<const float> fraction, std::span<const float> blurred, double voxel);
 
 /// Adds them to the signed distance of the rest [m] (nodes x 1). Their surface is where the fraction is a half, which is

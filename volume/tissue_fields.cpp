@@ -240,11 +240,11 @@ DistanceField distanceToSurface(const NodeGrid& grid, const std::vector<float>& 
         {grid, enclosed.distance.empty() ? signedDistance(grid, blurred, surface, 1.0F) : std::move(enclosed.distance)}};
 }
 
-// Whether nodes miss nothing that is a voxel thick.
+// Whether nodes see parts that are a voxel thick, along its longest edge at least.
 bool isAsFineAsVoxels(const TissueData& tissue, const NodeGrid& grid)
 {
     const Vec3 voxel = tissue.affine.spacing();
-    return grid.spacing < (1.0 + 1e-6) * std::min({voxel.x, voxel.y, voxel.z});
+    return grid.spacing < (1.0 + 1e-6) * std::max({voxel.x, voxel.y, voxel.z});
 }
 
 // keepsThin: parts of a voxel are as thick as that.

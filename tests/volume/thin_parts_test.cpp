@@ -39,14 +39,15 @@ struct Flap {
 };
 
 // The faces of a flap are those of its voxels, from near its root to near its edge. The blur of the surface leaves nothing
-// of a single layer: a tool went through it.
+// of a single layer: it was a sheet without thickness. A slice is thick enough for a field of longer steps than the other
+// edges.
 TEST(ThinParts, AreAsThickAsTheirVoxels)
 {
-    for (const Vec3 voxel : {Vec3(1e-3), Vec3(3e-3), Vec3(0.8e-3, 0.8e-3, 3e-3)}) {
+    for (const Vec3 voxel : {Vec3(1e-3), Vec3(3e-3), Vec3(0.8e-3, 0.8e-3, 3e-3), Vec3(0.7e-3, 0.7e-3, 3e-3)}) {
         for (const int layers : {1, 2}) {
             const Flap flap(voxel, voxel.z > voxel.x ? 2 : 1, layers);
             const Tissue tissue = flap.tissue();
-            const double edge = std::min(voxel.x, voxel.z), across = voxel[flap.axis];
+            const double edge = std::max(std::min(voxel.x, voxel.z), 0.75e-3), across = voxel[flap.axis];
             const DistanceField field = tissue.distanceToBody(coveringGrid(tissue.box(), edge, 4.0 * edge));
             Vec3 out(0.0);
             out[flap.axis] = 1.0;
