@@ -272,7 +272,8 @@ DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, c
     if (thin.around.empty()) {
         return distanceToSurface(grid, blurred, blur, volume);
     }
-    const double rest = volume - integral(grid, fraction) + integral(grid, thin.rest);
+    const double missed = volume - integral(grid, fraction);  // by nodes, which may take away more than is left
+    const double rest = std::max(integral(grid, thin.rest) + missed, std::pow(grid.spacing, 3));
     DistanceField field{
         {grid, std::vector<float>(grid.count(), static_cast<float>(glm::length(grid.box().high - grid.box().low)))}};
     if (*std::max_element(thin.rest.begin(), thin.rest.end()) > 0.5F) {
