@@ -189,19 +189,14 @@ public:
             const Vec3 at = centre + step_ * ((Vec3(part) + 0.5) / static_cast<double>(side) - 0.5);
             double tissue = 0.0;
             Vec3 slope(0.0);
-            const Vec3 low = glm::floor(at), t = at - low;
-            const std::array<Vec3, 2> w{1.0 - t, t};
-            for (std::size_t corner = 0; corner < 8; ++corner) {
-                const std::array<std::size_t, 3> far{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-                read(Index3(low) + Index3(far[0], far[1], far[2]), 1.0, Vec3(0.0), [&](std::uint16_t label, double) {
+            forEachCorner(at, [&](Index3 voxel, Vec3 share, Vec3 up) {
+                read(voxel, 1.0, Vec3(0.0), [&](std::uint16_t label, double) {
                     if (isTissue(label)) {
-                        const Vec3 share(w[far[0]].x, w[far[1]].y, w[far[2]].z);
-                        const Vec3 up = 2.0 * Vec3(far[0], far[1], far[2]) - 1.0;
                         tissue += share.x * share.y * share.z;
                         slope += up * Vec3(share.y * share.z, share.x * share.z, share.x * share.y);
                     }
                 });
-            }
+            });
             const double steepness = glm::length(slope * step_) / side;  // over a part's edge
             sum += steepness > 1e-9 ? std::clamp(0.5 + (tissue - 0.5) / steepness, 0.0, 1.0) : (tissue < 0.5 ? 0.0 : 1.0);
         });
@@ -280,19 +275,30 @@ private:
         }
     }
 
+    // Calls visit(voxel, share, up) for the eight around a place between them: share is its weight along each axis, up 1 on
+    // the far side and -1 on the near one.
     template <typename Visit>
-    void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
+    static void forEachCorner(Vec3 at, const Visit& visit)
     {
         const Vec3 low = glm::floor(at);
         const Vec3 t = at - low;
         const std::array<Vec3, 2> w{1.0 - t, t};
         for (std::size_t corner = 0; corner < 8; ++corner) {
             const std::array<std::size_t, 3> far{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
-            const double weight = w[far[0]].x * w[far[1]].y * w[far[2]].z;
-            if (weight > 0) {
-                read(Index3(low) + Index3(far[0], far[1], far[2]), fraction * weight, place, visit);
-            }
+            visit(Index3(low) + Index3(far[0], far[1], far[2]), Vec3(w[far[0]].x, w[far[1]].y, w[far[2]].z),
+                  2.0 * Vec3(far[0], far[1], far[2]) - 1.0);
         }
+    }
+
+    template <typename Visit>
+    void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
+    {
+        forEachCorner(at, [&](Index3 voxel, Vec3 share, Vec3) {
+            const double weight = share.x * share.y * share.z;
+            if (weight > 0) {
+                read(voxel, fraction * weight, place, visit);
+            }
+        });
     }
 
     template <typename Visit>

@@ -363,6 +363,7 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
     for (const Structure& s : tissue.structures) {
         rows[s.value] = tissue.lookup.solid[s.value] != 0 ? &tissue.table.rows[s.tissue] : nullptr;
     }
+    const auto isTissue = [&](std::uint16_t label) { return rows[label] != nullptr; };
     std::vector<CellMaterial> cells(grid.count());
     const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
     forEachRow(
@@ -374,11 +375,10 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 CellMaterial& cell = cells[grid.offset(n)];
                 cell = mixture.material();
                 if (mixture.fraction() < full) {
-                    cell.octants = sampler.octants(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
+                    cell.octants = sampler.octants(n, isTissue);
                 }
-                const auto scaled = static_cast<float>(scale(at, mixture.fraction(), [&] {
-                    return sampler.insideFaces(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
-                }));
+                const auto insideFaces = [&] { return sampler.insideFaces(n, isTissue); };
+                const auto scaled = static_cast<float>(scale(at, mixture.fraction(), insideFaces));
                 cell.youngsModulus *= scaled;
                 cell.fraction = std::min(scaled * cell.fraction, 1.0F);
             }
