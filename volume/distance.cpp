@@ -188,24 +188,17 @@ std::vector<float> distances(const NodeGrid& grid, std::span<const SurfacePoint>
 
 }  // namespace
 
-std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso)
-{
-    const Samples samples{grid, fraction};
-    std::vector<std::int32_t> nearest(grid.count(), -1);
-    const std::vector<SurfacePoint> points = collectSurface(samples, iso, nearest);
-    return distances(grid, points, nearest, [&](Index3, std::size_t i, const SurfacePoint*) { return fraction[i] > iso; });
-}
-
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso,
                                   std::span<const std::uint8_t> marked)
 {
+    const auto counts = [&](std::size_t i) { return marked.empty() || marked[i] != 0; };
     std::vector<std::int32_t> nearest(grid.count(), -1);
     const std::vector<SurfacePoint> points = collectSurface({grid, fraction}, iso, nearest);
     for (std::size_t i = 0; i < nearest.size(); ++i) {
-        nearest[i] = marked[i] != 0 ? nearest[i] : -1;
+        nearest[i] = counts(i) ? nearest[i] : -1;
     }
     return distances(grid, points, nearest,
-                     [&](Index3, std::size_t i, const SurfacePoint*) { return marked[i] != 0 && fraction[i] > iso; });
+                     [&](Index3, std::size_t i, const SurfacePoint*) { return counts(i) && fraction[i] > iso; });
 }
 
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,

@@ -23,12 +23,9 @@ void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vecto
 
 /// Signed distance [m], negative where fraction > iso, to the surface fraction = iso of the trilinear `fraction` (nodes x
 /// 1). Where no surface crosses the grid, the diagonal of the grid with the sign of the side it lies on.
-std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso);
-
-/// The same to the surface next to marked nodes alone; negative at no other.
-/// @param marked  1 (nodes x 1)
+/// @param marked  1 at nodes: the surface next to these alone, negative at no other (nodes x 1); empty: all of it
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso,
-                                  std::span<const std::uint8_t> marked);
+                                  std::span<const std::uint8_t> marked = {});
 
 /// The same to a surface from fractions, of which more than half are inside.
 /// @param weight  of the surface's way back: 1 as it was computed

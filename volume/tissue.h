@@ -146,7 +146,8 @@ public:
     /// the enclosed volume is kept also where the structure is thinner than the spacing. Throws when no voxel has these
     /// labels.
     DistanceField distanceTo(std::span<const std::uint16_t> labels, const NodeGrid& grid) const;
-    /// Signed distance to the surface of the whole body.
+    /// Signed distance to the surface of the whole body. Parts that are a voxel thick are as thick as their voxels, where
+    /// these are no thinner than `grid` is wide.
     DistanceField distanceToBody(const NodeGrid& grid) const;
     /// Young's modulus [Pa] averaged over each node's cell: the root of arithmetic times harmonic mean over the tissue in
     /// it (air does not count); cells without tissue take the value of the nearest tissue.
