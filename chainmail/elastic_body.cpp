@@ -2,6 +2,7 @@
 
 #include <chainmail/cell_levels.h>
 #include <chainmail/cut_cells.h>
+#include <chainmail/narrow_gaps.h>
 #include <volume/relaxation.h>
 
 #include <glm/common.hpp>
@@ -100,12 +101,28 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     return all;
 }
 
-// A surface that runs along the border of two cells may lie in the empty one, whose nodes have nothing to hold them.
-Vec3 anchorOf(const CellLevel& level, Vec3 on, Index3 under)
+// Whether two cells beside each other share one of the nodes between them: no gap divides them.
+bool shareNode(const CellLevel& level, Index3 a, Index3 b)
 {
-    const auto& g = level.nodes;
+    const auto nodesOf = [&](Index3 cell) {
+        std::array<std::uint32_t, 8> nodes{};
+        for (int i = 0; i < 8; ++i) {
+            nodes[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(level.nodes.offset(cell + octant(i)));
+        }
+        const auto own = level.fragments.in(cell, level.nodes.size.y);
+        return own.empty() ? nodes : own.front().nodes;
+    };
+    const auto other = nodesOf(b);
+    return std::ranges::any_of(nodesOf(a), [&](std::uint32_t n) { return std::ranges::find(other, n) != other.end(); });
+}
+
+// A surface that runs along the border of two cells may lie in the empty one, whose nodes have nothing to hold them; and
+// beside a narrow gap in one whose nodes are those of the other side.
+Vec3 anchorOf(const CellLevel& tissue, const CellLevel& divided, Vec3 on, Index3 under)
+{
+    const auto& g = tissue.nodes;
     const Index3 cell = g.cellAt(on);
-    if (g.contains(cell) && level.mu[g.offset(cell)] > 0.0F) {
+    if (g.contains(cell) && tissue.mu[g.offset(cell)] > 0.0F && shareNode(divided, cell, under)) {
         return on;
     }
     const Vec3 edge(1e-3 * g.spacing);
@@ -175,7 +192,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             const double full = std::clamp(0.5 - surface.at(cells.position(under)) / cells.spacing, 0.5, 1.0);
             const float mu = touched[finest.nodes.offset(under)] / static_cast<float>(full);
             if (mu > 0.0F) {
-                const Vec3 anchor = anchorOf(finest, on, under);
+                const Vec3 anchor = anchorOf(finest, body.levels.front(), on, under);
                 body.points.push_back({Vec3f(on), Vec3f(anchor), Vec3f(normal),
                                        static_cast<float>(sub * sub * sub * hat / width), mu,
                                        sliverLacks(finest, anchor, normal)});
@@ -214,48 +231,6 @@ void addSubsurface(const volume::DistanceField& surface, const CellLevel& finest
     body.subsurfaceRows = rowsOf(body.subsurface, nodes.size, &SubsurfaceNode::node);
 }
 
-// Of a cell with less tissue than fills an eighth of it by half: its eighths with most filled ones around them, and the
-// whole cell where there are none.
-std::uint8_t sliverOf(const std::vector<std::uint8_t>& octants, const volume::NodeGrid& nodes, Index3 cell)
-{
-    int most = 1;
-    std::uint8_t found = 0;
-    for (int i = 0; i < 8; ++i) {
-        const Index3 half = 2 * cell + octant(i);
-        int filled = 0;
-        volume::forEachIndex(half - 1, half + 1, [&](Index3 beside) {
-            const Index3 off = beside % 2;
-            filled += octants[nodes.offset(beside / 2)] >> octantOf(off) & 1;
-        });
-        found = filled > most ? std::uint8_t{0} : found;
-        most = std::max(most, filled);
-        found |= static_cast<std::uint8_t>(filled == most ? 1 << i : 0);
-    }
-    return found != 0 ? found : std::uint8_t{0xFF};
-}
-
-// Of every cell, see FinestLevel::octants.
-std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                                    const CellLevel& level)
-{
-    std::vector<std::uint8_t> known(level.nodes.count(), 0);
-    bool isDivided = false;
-    volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
-        const std::size_t at = level.nodes.offset(c);
-        known[at] = level.mu[at] > 0.0F ? materials[cells.offset(c)].octants : std::uint8_t{0};
-        isDivided = isDivided || (known[at] != 0xFF && level.mu[at] > 0.0F);
-    });
-    if (!isDivided) {
-        return {};
-    }
-    std::vector<std::uint8_t> octants = known;
-    volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
-        const std::size_t at = level.nodes.offset(c);
-        octants[at] = known[at] == 0 && level.mu[at] > 0.0F ? sliverOf(known, level.nodes, c) : known[at];
-    });
-    return octants;
-}
-
 // The cells that the body's surface cuts.
 void addCuts(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
              const volume::DistanceField& surface, CellLevel& level)
@@ -285,8 +260,8 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
     all.octants = octantsOf(cells, materials, all.level);
     addCuts(cells, materials, surface, all.level);
-    addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
+    addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     addSubsurface(surface, body.levels.front(), body);
     body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
     body.held = std::move(all.held);

@@ -177,6 +177,41 @@ public:
         return static_cast<std::uint8_t>(found);
     }
 
+    // Which of the 64 parts of a node's cell have tissue in their middle: CellMaterial::quarters. Between voxels far
+    // smaller than the parts, by the nearest one.
+    template <typename IsTissue>
+    std::uint64_t quarters(Index3 n, const IsTissue& isTissue) const
+    {
+        constexpr std::size_t most = 512;
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const Vec3 reach = 0.375 * (glm::abs(step_[0]) + glm::abs(step_[1]) + glm::abs(step_[2])) + 1e-6;
+        const Index3 low(glm::floor(centre - reach)), size = Index3(glm::floor(centre + reach)) + 2 - low;
+        std::array<double, most> near;
+        const auto tissueAt = [&](Index3 voxel) {
+            bool is = false;
+            read(voxel, 1.0, Vec3(0.0), [&](std::uint16_t label, double) { is = isTissue(label); });
+            return is ? 1.0 : 0.0;
+        };
+        const bool isNear = base::countOf(size) <= most;
+        if (isNear) {
+            forEachIndex(Index3(0), size - 1, [&](Index3 at) { near[base::offsetOf(size, at)] = tissueAt(low + at); });
+        }
+        std::uint64_t found = 0;
+        for (int i = 0; i < 64; ++i) {
+            const Vec3 at = centre + step_ * (0.25 * Vec3(i & 3, i >> 2 & 3, i >> 4) - 0.375);
+            double tissue = 0.0;
+            if (isNear) {
+                forEachCorner(at, [&](Index3 voxel, Vec3 share, Vec3) {
+                    tissue += share.x * share.y * share.z * near[base::offsetOf(size, voxel - low)];
+                });
+            } else {
+                tissue = tissueAt(Index3(glm::round(at)));
+            }
+            found |= tissue >= 0.5 - 1e-9 ? std::uint64_t{1} << i : std::uint64_t{0};
+        }
+        return found;
+    }
+
     // Fraction of a node's cell in which more than half of what lies between voxels is tissue: what the faces of voxels
     // along the axes enclose, wherever the cell lies. 4^3 parts, each from empty to full over its edge.
     template <typename IsTissue>

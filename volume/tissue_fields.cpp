@@ -374,8 +374,12 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 const CellMixture mixture = cellMixture(tissue, sampler, n, at, rows);
                 CellMaterial& cell = cells[grid.offset(n)];
                 cell = mixture.material();
-                if (mixture.fraction() < full) {
+                if (mixture.fraction() <= 0.0) {
+                    cell.octants = 0;
+                    cell.quarters = 0;
+                } else if (mixture.fraction() < full) {
                     cell.octants = sampler.octants(n, isTissue);
+                    cell.quarters = sampler.quarters(n, isTissue);
                 }
                 const auto insideFaces = [&] { return sampler.insideFaces(n, isTissue); };
                 const auto scaled = static_cast<float>(scale(at, mixture.fraction(), insideFaces));

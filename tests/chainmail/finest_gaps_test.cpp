@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <numeric>
 #include <random>
+#include <set>
 #include <span>
 #include <vector>
 
@@ -176,6 +177,11 @@ volume::CellMaterial sampled(Index3 c, bool isHeld, const IsFilled& isFilled)
     for (int k = 0; k < 8; ++k) {
         tissue.octants |= static_cast<std::uint8_t>(isFilled(Vec3(c) + 0.5 * Vec3(octant(k)) + 0.25) ? 1 << k : 0);
     }
+    tissue.quarters = 0;
+    for (int k = 0; k < 64; ++k) {
+        const bool is = isFilled(Vec3(c) + 0.25 * Vec3(k % 4, k / 4 % 4, k / 16) + 0.125);
+        tissue.quarters |= is ? std::uint64_t{1} << k : std::uint64_t{0};
+    }
     return tissue;
 }
 
@@ -201,59 +207,151 @@ TEST(FinestGaps, StepsOfVoxelsAreNoGaps)
     }
 }
 
-// Of the finest level's nodes, one of each part that hangs together.
-int partsOf(const CellLevel& level)
-{
-    std::vector<std::size_t> lead(level.nodes.count() + level.fragments.nodes.size());
-    std::iota(lead.begin(), lead.end(), std::size_t{0});
-    std::vector<bool> has(lead.size(), false);
-    const auto of = [&](std::size_t i) {
-        while (lead[i] != i) {
-            i = lead[i];
+// Which nodes of a level hang together.
+class Parts {
+public:
+    explicit Parts(const CellLevel& level) : level_(level), lead_(level.nodes.count() + level.fragments.nodes.size())
+    {
+        std::iota(lead_.begin(), lead_.end(), std::size_t{0});
+        volume::forEachIndex(Index3(0), level.nodes.size - 2, [&](Index3 c) {
+            if (level.mu[level.nodes.offset(c)] > 0.0F) {
+                join(boxNodesOf(c));
+            }
+        });
+        for (const CellFragment& f : level.fragments.cells) {
+            join(f.nodes);
         }
-        return i;
-    };
-    const auto join = [&](const std::array<std::uint32_t, 8>& nodes) {
-        for (const std::uint32_t n : nodes) {
-            has[n] = true;
-            lead[of(n)] = of(nodes[0]);
-        }
-    };
-    volume::forEachIndex(Index3(0), level.nodes.size - 2, [&](Index3 c) {
+    }
+
+    std::size_t count() const { return members_.size(); }
+    // One node of that which a cell of the level belongs to.
+    std::size_t of(Index3 cell) const
+    {
+        const auto own = level_.fragments.in(cell, level_.nodes.size.y);
+        return leadOf(own.empty() ? boxNodesOf(cell)[0] : own.front().nodes[0]);
+    }
+
+private:
+    std::array<std::uint32_t, 8> boxNodesOf(Index3 cell) const
+    {
         std::array<std::uint32_t, 8> nodes{};
         for (int k = 0; k < 8; ++k) {
-            nodes[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(level.nodes.offset(c + octant(k)));
+            nodes[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(level_.nodes.offset(cell + octant(k)));
         }
-        if (level.mu[level.nodes.offset(c)] > 0.0F) {
-            join(nodes);
+        return nodes;
+    }
+    std::size_t leadOf(std::size_t i) const
+    {
+        while (lead_[i] != i) {
+            i = lead_[i];
         }
-    });
-    for (const CellFragment& f : level.fragments.cells) {
-        join(f.nodes);
+        return i;
     }
-    int parts = 0;
-    for (std::size_t i = 0; i < lead.size(); ++i) {
-        parts += has[i] && of(i) == i ? 1 : 0;
+    void join(const std::array<std::uint32_t, 8>& nodes)
+    {
+        for (const std::uint32_t n : nodes) {
+            members_.erase(leadOf(n));
+            lead_[leadOf(n)] = leadOf(nodes[0]);
+        }
+        members_.insert(leadOf(nodes[0]));
     }
-    return parts;
-}
 
-// A gap of 2.6 cells through all of a body leaves two parts, at any angle and place in the grid: eighths that touch have
-// their middles within 0.87 cells of each other, and one that is little filled touches one that is.
+    const CellLevel& level_;
+    std::vector<std::size_t> lead_;
+    std::set<std::size_t> members_;  // a node of each part
+};
+
+// A gap of a quarter of a cell and more through all of a body leaves two parts on every level, at any angle and place.
 TEST(FinestGaps, AnObliqueGapLeavesTwoParts)
 {
     std::mt19937 random(29);
     std::normal_distribution<double> any;
-    for (int i = 0; i < 100; ++i) {
+    std::uniform_real_distribution<double> widths(0.26, 2.0);
+    for (int i = 0; i < 60; ++i) {
         const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
         const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
+        const double width = i < 20 ? 0.26 : widths(random);
         const auto material = [&](Index3 c) {
             const double off = glm::dot(normal, Vec3(c) + 0.5 - middle);
-            return sampled(c, std::abs(off) > 4.8, [&](Vec3 p) { return std::abs(glm::dot(normal, p - middle)) > 1.3; });
+            return sampled(c, std::abs(off) > 4.8,
+                           [&](Vec3 p) { return std::abs(glm::dot(normal, p - middle)) > 0.5 * width; });
         };
-        const ElasticBody body = tests::bodyOf({Index3(16), edge, material, 3, Vec3(0.0)});
-        EXPECT_EQ(partsOf(body.levels.front()), 2) << normal.x << " " << normal.y << " " << normal.z;
+        for (const CellLevel& level : tests::bodyOf({Index3(16), edge, material, 3, Vec3(0.0)}).levels) {
+            EXPECT_EQ(Parts(level).count(), 2U) << width << ": " << normal.x << " " << normal.y << " " << normal.z;
+        }
     }
+}
+
+// A slanted sheet of one layer of voxels hangs together as far as its eighths do, though its voxels share edges alone where
+// it has a step: of strips that are held at their ends each would otherwise be a part of its own.
+TEST(FinestGaps, ASlantedSheetOfOneVoxelIsNotCut)
+{
+    std::mt19937 random(37);
+    std::normal_distribution<double> any;
+    int one = 0;
+    for (int i = 0; i < 16; ++i) {
+        const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
+        const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
+        const double voxel = i % 2 == 0 ? 0.5 : 0.66;
+        const double thick = voxel * std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
+        const auto isFilled = [&](Vec3 p) {
+            const Vec3 ofVoxel = voxel * (glm::floor(p / voxel) + 0.5);
+            return std::abs(glm::dot(normal, ofVoxel - middle)) < 0.5 * thick + 1e-9;
+        };
+        const auto parts = [&](bool isCut) {
+            const auto material = [&](Index3 c) {
+                auto tissue = sampled(c, glm::distance(Vec3(c) + 0.5, middle) > 6.0, isFilled);
+                tissue.quarters = isCut ? tissue.quarters : ~std::uint64_t{0};
+                return tissue;
+            };
+            return Parts(tests::bodyOf({Index3(16), edge, material, 3, Vec3(0.0)}).levels.front()).count();
+        };
+        const std::size_t found = parts(true);
+        EXPECT_EQ(found, parts(false)) << voxel << ": " << normal.x << " " << normal.y << " " << normal.z;
+        one += found == 1 ? 1 : 0;
+    }
+    EXPECT_GT(one, 8);
+}
+
+// A place on the wall of a gap of half a cell moves with the tissue behind it, also where its cell is the other side's.
+TEST(FinestGaps, AWallMovesWithItsOwnSide)
+{
+    std::mt19937 random(41);
+    std::normal_distribution<double> any;
+    std::size_t points = 0;
+    for (int i = 0; i < 40; ++i) {
+        const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
+        const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
+        const double width = 0.5 + 0.05 * (i % 20);
+        const volume::NodeGrid grid{Index3(22), Vec3(-2.5 * edge), edge};
+        std::vector<volume::CellMaterial> materials(grid.count());
+        volume::forEachIndex(Index3(0), Index3(15), [&](Index3 c) {
+            const double off = glm::dot(normal, Vec3(c) + 0.5 - middle);
+            materials[grid.offset(c + 3)] = sampled(
+                c, std::abs(off) > 4.8, [&](Vec3 p) { return std::abs(glm::dot(normal, p - middle)) > 0.5 * width; });
+        });
+        const auto surface = tests::distanceOn(grid, [&](Vec3 p) {
+            const double inGap = edge * 0.5 * width - std::abs(glm::dot(normal, p - edge * middle));
+            return std::max(tests::boxDistance(p, Vec3(0.0), Vec3(16 * edge)), inGap);
+        });
+        const ElasticBody body = elasticBody(grid, materials, surface, 0.49, 0.0, false, {});
+        const CellLevel& level = body.levels.front();
+        const Parts parts(level);
+        std::array<std::set<std::size_t>, 2> sides;  // the parts that each side's wall moves with
+        for (const SurfacePoint& p : body.points) {
+            const double off = glm::dot(normal, Vec3(p.position) - edge * middle);
+            const bool isDeep = tests::boxDistance(Vec3(p.position), Vec3(0.0), Vec3(16 * edge)) < -3 * edge;
+            if (isDeep && off * glm::dot(normal, Vec3(p.normal)) < -0.9 * std::abs(off)) {
+                sides[off > 0.0 ? 1 : 0].insert(parts.of(level.nodes.cellAt(Vec3(p.anchor))));
+                ++points;
+            }
+        }
+        for (const std::size_t part : sides[0]) {
+            EXPECT_FALSE(sides[1].contains(part)) << width;
+        }
+        EXPECT_FALSE(sides[0].empty() || sides[1].empty());
+    }
+    EXPECT_GT(points, 1000U);
 }
 
 }  // namespace
