@@ -150,12 +150,12 @@ private:
         return known->second;
     }
 
-    // Joins a fragment of the fine level and the pieces of its coarse cell that share a node with it.
+    // Joins a fragment of the fine level and the piece of its coarse cell that it belongs to.
     void addFragment(const CellFragment& f, std::vector<Piece>& found) const
     {
         Piece one{f.cell / 2, 0, {}, {}};
         std::erase_if(found, [&](const Piece& other) {
-            const bool isPart = shareNode(other, f);
+            const bool isPart = shareMiddle(other, f);
             one.children |= isPart ? other.children : std::uint8_t{0};
             one.fragments.insert(one.fragments.end(), other.fragments.begin(),
                                  isPart ? other.fragments.end() : other.fragments.begin());
@@ -165,28 +165,16 @@ private:
         found.push_back(std::move(one));
     }
 
-    bool shareNode(const Piece& piece, const CellFragment& f) const
+    // Of a coarse cell, by the node in its middle. So a gap ends at the side of a coarse cell to which its end is nearer.
+    bool shareMiddle(const Piece& piece, const CellFragment& f) const
     {
-        return std::ranges::any_of(f.nodes, [&](std::uint32_t node) {
-            const auto has = [&](std::uint32_t other) {
-                const auto& nodes = fine_.fragments.cells[other].nodes;
-                return std::ranges::find(nodes, node) != nodes.end();
-            };
-            return (!isVirtual(node) && isCorner(piece, fine_.nodes.node(node))) ||
-                   std::ranges::any_of(piece.fragments, has);
-        });
-    }
-
-    // Whether a node of the fine level is one of the piece's whole cells.
-    static bool isCorner(const Piece& piece, Index3 node)
-    {
-        for (int i = 0; i < 8; ++i) {
-            const Index3 off = node - (2 * piece.cell + octant(i));
-            if ((piece.children >> i & 1) != 0 && off == glm::clamp(off, Index3(0), Index3(1))) {
-                return true;
-            }
-        }
-        return false;
+        const auto middleOf = [](const CellFragment& g) {
+            return g.nodes[static_cast<std::size_t>(octantOf(1 - g.cell % 2))];
+        };
+        const std::uint32_t own = middleOf(f);
+        return (piece.children != 0 && own == fine_.nodes.offset(2 * piece.cell + 1)) ||
+               std::ranges::any_of(piece.fragments,
+                                   [&](std::uint32_t i) { return middleOf(fine_.fragments.cells[i]) == own; });
     }
 
     // Gives the pieces around a node nodes of their own, where they do not hang together there.
