@@ -19,6 +19,7 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr int fewestNodes = 9;      // the coarsest level has at most as many along each side
+constexpr double cellUnder = 0.6;   // depth under the surface at which a place's tissue is taken [cells]
 constexpr float minTissue = 0.01F;  // cells with less of a typical stiffness are empty
 
 // Nodes along each side, so that every level has whole cells: a multiple of 2^(levels - 1) cells.
@@ -101,33 +102,43 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     return all;
 }
 
-// Whether two cells beside each other share one of the nodes between them: no gap divides them.
-bool shareNode(const CellLevel& level, Index3 a, Index3 b)
-{
-    const auto nodesOf = [&](Index3 cell) {
-        std::array<std::uint32_t, 8> nodes{};
-        for (int i = 0; i < 8; ++i) {
-            nodes[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(level.nodes.offset(cell + octant(i)));
-        }
-        const auto own = level.fragments.in(cell, level.nodes.size.y);
-        return own.empty() ? nodes : own.front().nodes;
-    };
-    const auto other = nodesOf(b);
-    return std::ranges::any_of(nodesOf(a), [&](std::uint32_t n) { return std::ranges::find(other, n) != other.end(); });
-}
-
-// A surface that runs along the border of two cells may lie in the empty one, whose nodes have nothing to hold them; and
-// beside a narrow gap in one whose nodes are those of the other side.
-Vec3 anchorOf(const CellLevel& tissue, const CellLevel& divided, Vec3 on, Index3 under)
-{
-    const auto& g = tissue.nodes;
-    const Index3 cell = g.cellAt(on);
-    if (g.contains(cell) && tissue.mu[g.offset(cell)] > 0.0F && shareNode(divided, cell, under)) {
-        return on;
+// What a place on the surface moves with: the nearest point of a cell that holds the tissue under it. A surface that runs
+// along the border of two cells may lie in the empty one; beside a narrow gap it may lie in a cell whose nodes are those of
+// the other side, and so may the cell under it.
+class Anchors {
+public:
+    Anchors(const CellLevel& tissue, const CellLevel& divided, const volume::DistanceField& surface)
+        : tissue_(tissue), divided_(divided), surface_(surface)
+    {
     }
-    const Vec3 edge(1e-3 * g.spacing);
-    return glm::clamp(on, g.position(under) + edge, g.position(under + 1) - edge);
-}
+
+    Vec3 of(Vec3 on, Vec3 normal, Index3 under) const
+    {
+        const auto& g = tissue_.nodes;
+        const double deep = 2.0 * cellUnder * g.spacing;
+        const Vec3 inside = on - deep * normal;
+        const Index3 inner = g.cellAt(inside);
+        const bool isThick = surface_.at(inside) < -0.6 * deep && isTissue(inner);
+        const bool isUnderOwn = !isThick || shareNode(divided_, under, inner);
+        const Index3 cell = g.cellAt(on);
+        if (isUnderOwn && isTissue(cell) && shareNode(divided_, cell, under)) {
+            return on;
+        }
+        const Vec3 edge(1e-3 * g.spacing);
+        const Index3 own = isUnderOwn ? under : inner;
+        return glm::clamp(on, g.position(own) + edge, g.position(own + 1) - edge);
+    }
+
+private:
+    bool isTissue(Index3 cell) const
+    {
+        return tissue_.nodes.contains(cell) && tissue_.mu[tissue_.nodes.offset(cell)] > 0.0F;
+    }
+
+    const CellLevel& tissue_;
+    const CellLevel& divided_;
+    const volume::DistanceField& surface_;
+};
 
 // Of sub-cells along a cell, in which surface points sit: two, and more where a small tool would fall between the points.
 int pointsPerEdge(double spacing, double toolRadius)
@@ -169,6 +180,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
 {
     const CellLevel& finest = all.level;
     const std::vector<float> touched = touchedModuli(all);
+    const Anchors anchors(finest, body.levels.front(), surface);
     const double sub = cells.spacing / perEdge;
     body.pieceEdge = sub;
     volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
@@ -184,7 +196,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             const double distance = surface.at(p);
             const double hat = 1.0 - std::abs(distance) / width;
             const Vec3 on = p - distance * normal;
-            const Index3 under = finest.nodes.cellAt(on - 0.6 * cells.spacing * normal);
+            const Index3 under = finest.nodes.cellAt(on - cellUnder * cells.spacing * normal);
             if (hat <= 0.0 || !finest.nodes.contains(under)) {
                 return;
             }
@@ -192,7 +204,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             const double full = std::clamp(0.5 - surface.at(cells.position(under)) / cells.spacing, 0.5, 1.0);
             const float mu = touched[finest.nodes.offset(under)] / static_cast<float>(full);
             if (mu > 0.0F) {
-                const Vec3 anchor = anchorOf(finest, body.levels.front(), on, under);
+                const Vec3 anchor = anchors.of(on, normal, under);
                 body.points.push_back({Vec3f(on), Vec3f(anchor), Vec3f(normal),
                                        static_cast<float>(sub * sub * sub * hat / width), mu,
                                        sliverLacks(finest, anchor, normal)});
@@ -248,6 +260,23 @@ void addCuts(const volume::NodeGrid& cells, const std::vector<volume::CellMateri
 }
 
 }  // namespace
+
+bool shareNode(const CellLevel& level, Index3 a, Index3 b) noexcept
+{
+    if (level.fragments.cells.empty()) {
+        return true;
+    }
+    const auto nodesOf = [&](Index3 cell) {
+        std::array<std::uint32_t, 8> nodes{};
+        for (int i = 0; i < 8; ++i) {
+            nodes[static_cast<std::size_t>(i)] = static_cast<std::uint32_t>(level.nodes.offset(cell + octant(i)));
+        }
+        const auto own = level.fragments.in(cell, level.nodes.size.y);
+        return own.empty() ? nodes : own.front().nodes;
+    };
+    const auto other = nodesOf(b);
+    return std::ranges::any_of(nodesOf(a), [&](std::uint32_t n) { return std::ranges::find(other, n) != other.end(); });
+}
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius, bool relaxes,

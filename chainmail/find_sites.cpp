@@ -294,7 +294,7 @@ private:
             }
             ContactSite& site = out_[count_] = whole;
             site.rest += off;
-            site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
+            site.anchor += isOfSameTissue(site.anchor, site.anchor + off) ? off : Vec3(0.0);
             site.atRest = site.stiffness = whole.atRest / count;
             site.area = whole.area / static_cast<float>(count);
             addIfNear(shape, site);
@@ -305,6 +305,13 @@ private:
     {
         const auto& grid = body_.levels.front().nodes;
         return body_.held[grid.offset(grid.cellAt(at))] > 0.5F;
+    }
+
+    // Of two places less than a cell apart.
+    bool isOfSameTissue(Vec3 one, Vec3 other) const noexcept
+    {
+        const CellLevel& level = body_.levels.front();
+        return hasTissue(other) && shareNode(level, level.nodes.cellAt(one), level.nodes.cellAt(other));
     }
 
     bool hasTissue(Vec3 at) const noexcept { return muAt(body_.levels.front(), at) > 0.0F; }

@@ -169,7 +169,7 @@ void handDown(Window& coarse, Field field, Window& fine) noexcept
 namespace {
 
 // Which nodes move tissue: by how much, at the middle of a cell's tissue, over that in a full cell. In Field::t, 1 or 0.
-const float* markHolding(Window& w) noexcept
+float* markHolding(Window& w) noexcept
 {
     constexpr float least = 0.1F;
     float* holds = w.field(Field::t);
@@ -188,6 +188,19 @@ const float* markHolding(Window& w) noexcept
         }
     });
     return holds;
+}
+
+constexpr float besideGap = -1.0F;
+
+// Marks the nodes of a window that lie within a node of the fragments of `w`: that window, or the next coarser one, of
+// which it begins at node `offset`.
+void markGaps(const Window& w, int nodesPerCell, Index3 offset, const Window& fine, float* holds) noexcept
+{
+    for (const WindowFragments::Placed& p : w.fragments.placed()) {
+        const Index3 low = nodesPerCell * (p.cell - w.low - offset);
+        volume::forEachIndex(glm::max(low - 1, Index3(0)), glm::min(low + nodesPerCell + 1, fine.box - 1),
+                             [&](Index3 n) { holds[fine.layout.at(n.x, n.y, n.z)] = besideGap; });
+    }
 }
 
 // What the tissue beside a node does, in a straight line up to the node; what the node itself does where there is none.
@@ -216,9 +229,10 @@ Vec3 continued(const Window& w, Field field, const float* holds, Index3 n) noexc
 // fine one's border where that follows; what it holds is at rest.
 void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept
 {
-    const bool hasGaps = !fine.fragments.placed().empty() || !coarse.fragments.placed().empty();
-    const float* holds = hasGaps ? nullptr : markHolding(fine);
+    float* holds = markHolding(fine);
     const Index3 o = fine.offsetIn(coarse);
+    markGaps(fine, 1, Index3(0), fine, holds);
+    markGaps(coarse, 2, o, fine, holds);
     volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
         const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
         const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
@@ -226,7 +240,7 @@ void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcep
             return;
         }
         const bool isHeld = coarse.open[target] == 0.0F;
-        const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holds[source] > 0.0F;
+        const bool own = coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holds[source] != 0.0F;
         for (const Field field : fields) {
             coarse.set(field, target,
                        isHeld ? Vec3(0.0)

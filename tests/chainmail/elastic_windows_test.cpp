@@ -266,10 +266,16 @@ TEST(ElasticWindows, FollowingWithSmallWindowsKeepsAnAffineFieldExactly)
 }
 
 // A surface at every second node, so that wider cells are half full: their nodes over the surface have tissue where those
-// of the finer window at the same places have none, and whatever displacement.
-TEST(ElasticWindows, FollowingTakesNothingFromNodesWithoutTissue)
+// of the finer window at the same places have none, and whatever displacement. With or without a slit; not beside it.
+void checkFollowingOfSurface(bool hasSlit)
 {
+    constexpr int slit = 32;
     auto block = tests::heldBlock({40, 24, 40}, spacing, modulus, 0.3);
+    if (hasSlit) {
+        block.material = [whole = block.material](Index3 c) {
+            return c.x == slit && c.y < 12 ? volume::CellMaterial{} : whole(c);
+        };
+    }
     block.air = 3;
     const ElasticBody body = tests::bodyOf(block);
     WindowStack stack(body, 13, tests::focusUnder({10e-3, 0.0, 20e-3}));
@@ -285,11 +291,22 @@ TEST(ElasticWindows, FollowingTakesNothingFromNodesWithoutTissue)
     ASSERT_TRUE(stack.follow(tests::focusUnder({30e-3, 0.0, 20e-3}), true));
     double most = 0.0;
     tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3 rest) {
-        if (w.dof[node] != 0.0F && rest.y < 24e-3 - 2.0 * body.levels.back().nodes.spacing) {
+        const bool isBeside = hasSlit && rest.x > slit * spacing - 2.0 * body.levels.back().nodes.spacing;
+        if (w.dof[node] != 0.0F && !isBeside && rest.y < 24e-3 - 2.0 * body.levels.back().nodes.spacing) {
             most = std::max(most, glm::distance(tests::valueAt(w, node, Field::u), affine(rest)));
         }
     });
     EXPECT_LT(most, 1e-6 * spacing);
+}
+
+TEST(ElasticWindows, FollowingTakesNothingFromNodesWithoutTissue)
+{
+    checkFollowingOfSurface(false);
+}
+
+TEST(ElasticWindows, NorDoesItInABodyThatHasASlitElsewhere)
+{
+    checkFollowingOfSurface(true);
 }
 
 // Cells of 1, 2 and 4 mm hold other nodes: a fine node beside the base may be free and the coarse one at its place held,

@@ -322,7 +322,7 @@ TEST(FinestGaps, AWallMovesWithItsOwnSide)
     for (int i = 0; i < 40; ++i) {
         const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
         const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
-        const double width = 0.5 + 0.05 * (i % 20);
+        const double width = 0.3 + 0.05 * (i % 20);
         const volume::NodeGrid grid{Index3(22), Vec3(-2.5 * edge), edge};
         std::vector<volume::CellMaterial> materials(grid.count());
         volume::forEachIndex(Index3(0), Index3(15), [&](Index3 c) {
