@@ -313,7 +313,8 @@ TEST(FinestGaps, ASlantedSheetOfOneVoxelIsNotCut)
     EXPECT_GT(one, 8);
 }
 
-// A place on the wall of a gap of half a cell moves with the tissue behind it, also where its cell is the other side's.
+// A place on the wall of a gap of a third of a cell moves with the tissue behind it, also where its cell is the other
+// side's.
 TEST(FinestGaps, AWallMovesWithItsOwnSide)
 {
     std::mt19937 random(41);
@@ -337,12 +338,16 @@ TEST(FinestGaps, AWallMovesWithItsOwnSide)
         const ElasticBody body = elasticBody(grid, materials, surface, 0.49, 0.0, false, {});
         const CellLevel& level = body.levels.front();
         const Parts parts(level);
+        const auto offOf = [&](Vec3 place) { return glm::dot(normal, place - edge * middle); };
+        const auto isOfWall = [&](const SurfacePoint& p) {
+            const double off = offOf(Vec3(p.position));
+            const bool isDeep = tests::boxDistance(Vec3(p.position), Vec3(0.0), Vec3(16 * edge)) < -3 * edge;
+            return isDeep && off * glm::dot(normal, Vec3(p.normal)) < -0.9 * std::abs(off);
+        };
         std::array<std::set<std::size_t>, 2> sides;  // the parts that each side's wall moves with
         for (const SurfacePoint& p : body.points) {
-            const double off = glm::dot(normal, Vec3(p.position) - edge * middle);
-            const bool isDeep = tests::boxDistance(Vec3(p.position), Vec3(0.0), Vec3(16 * edge)) < -3 * edge;
-            if (isDeep && off * glm::dot(normal, Vec3(p.normal)) < -0.9 * std::abs(off)) {
-                sides[off > 0.0 ? 1 : 0].insert(parts.of(level.nodes.cellAt(Vec3(p.anchor))));
+            if (isOfWall(p)) {
+                sides[offOf(Vec3(p.position)) > 0.0 ? 1 : 0].insert(parts.of(level.nodes.cellAt(Vec3(p.anchor))));
                 ++points;
             }
         }
@@ -350,6 +355,19 @@ TEST(FinestGaps, AWallMovesWithItsOwnSide)
             EXPECT_FALSE(sides[1].contains(part)) << width;
         }
         EXPECT_FALSE(sides[0].empty() || sides[1].empty());
+        // The parts of these places that a small tool in the gap is given.
+        const WindowStack stack(body, 21, tests::focusAt(edge * middle));
+        const ElasticTool tool{{edge * middle, edge * middle, 1.5 * edge, 1.5 * edge}, Vec3(0.1 * edge)};
+        std::vector<ContactSite> sites(20000);
+        sites.resize(findSites(body, stack.windows(), std::span(&tool, 1),
+                               std::vector{occupancy::ShapeDistance(tool.shape)}, {}, edge, sites));
+        EXPECT_GT(sites.size(), 100U);
+        for (const ContactSite& site : sites) {
+            const SurfacePoint& point = body.points[site.point];
+            const bool isHere = offOf(Vec3(point.position)) > 0.0;
+            EXPECT_FALSE(isOfWall(point) && sides[isHere ? 0 : 1].contains(parts.of(level.nodes.cellAt(site.anchor))))
+                << width;
+        }
     }
     EXPECT_GT(points, 1000U);
 }
