@@ -28,8 +28,8 @@ struct FinestLevel {
     /// these.
     std::vector<std::uint8_t> mostlyHeld;
     std::vector<MixedCell> mixed;  // by z, then y, then x
-    /// Which eighths of each cell are mostly tissue, a bit for each, x fastest: gaps between these divide the finest level,
-    /// too (count x 1). Empty: gaps are looked for between whole cells.
+    /// Which eighths of each cell count as tissue, a bit for each, x fastest (octantsOf()): gaps between these divide the
+    /// finest level, too (count x 1). Empty: gaps are looked for between whole cells.
     std::vector<std::uint8_t> octants;
 };
 

@@ -102,9 +102,15 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     return all;
 }
 
-// What a place on the surface moves with: the nearest point of a cell that holds the tissue under it. A surface that runs
-// along the border of two cells may lie in the empty one; beside a narrow gap it may lie in a cell whose nodes are those of
-// the other side, and so may the cell under it.
+// What a place on the surface moves with.
+struct Anchor {
+    Vec3 at{0.0};
+    Index3 cell{0};  // of the tissue under the place
+};
+
+// Finds the nearest point of a cell that holds the tissue under a place. A surface that runs along the border of two cells
+// may lie in the empty one; beside a narrow gap it may lie in a cell whose nodes are those of the other side, and so may
+// the cell under it. Of a thin part the cell under the place may be of what lies behind it.
 class Anchors {
 public:
     Anchors(const CellLevel& tissue, const CellLevel& divided, const volume::DistanceField& surface)
@@ -112,21 +118,23 @@ public:
     {
     }
 
-    Vec3 of(Vec3 on, Vec3 normal, Index3 under) const
+    Anchor of(Vec3 on, Vec3 normal, Index3 under) const
     {
         const auto& g = tissue_.nodes;
-        const double deep = 2.0 * cellUnder * g.spacing;
-        const Vec3 inside = on - deep * normal;
-        const Index3 inner = g.cellAt(inside);
-        const bool isThick = surface_.at(inside) < -0.6 * deep && isTissue(inner);
-        const bool isUnderOwn = !isThick || shareNode(divided_, under, inner);
+        const Vec3 way = cellUnder * g.spacing * normal;
+        const Index3 inner = g.cellAt(on - 2.0 * way);
+        const bool isInner = surface_.at(on - 2.0 * way) < -1.2 * cellUnder * g.spacing && isTissue(inner) &&
+                             !shareNode(divided_, under, inner);
+        const Index3 own = isInner ? inner : under;
         const Index3 cell = g.cellAt(on);
-        if (isUnderOwn && isTissue(cell) && shareNode(divided_, cell, under)) {
-            return on;
+        if (isTissue(cell) && shareNode(divided_, cell, own)) {
+            return {on, own};
+        }
+        if (isTissue(cell) && !isInner && surface_.at(on - way) > 0.0) {
+            return {on, cell};
         }
         const Vec3 edge(1e-3 * g.spacing);
-        const Index3 own = isUnderOwn ? under : inner;
-        return glm::clamp(on, g.position(own) + edge, g.position(own + 1) - edge);
+        return {glm::clamp(on, g.position(own) + edge, g.position(own + 1) - edge), own};
     }
 
 private:
@@ -200,14 +208,14 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             if (hat <= 0.0 || !finest.nodes.contains(under)) {
                 return;
             }
+            const Anchor anchor = anchors.of(on, normal, under);
             // A cell that the surface runs through is as much softer as it is less full.
-            const double full = std::clamp(0.5 - surface.at(cells.position(under)) / cells.spacing, 0.5, 1.0);
-            const float mu = touched[finest.nodes.offset(under)] / static_cast<float>(full);
+            const double full = std::clamp(0.5 - surface.at(cells.position(anchor.cell)) / cells.spacing, 0.5, 1.0);
+            const float mu = touched[finest.nodes.offset(anchor.cell)] / static_cast<float>(full);
             if (mu > 0.0F) {
-                const Vec3 anchor = anchors.of(on, normal, under);
-                body.points.push_back({Vec3f(on), Vec3f(anchor), Vec3f(normal),
+                body.points.push_back({Vec3f(on), Vec3f(anchor.at), Vec3f(normal),
                                        static_cast<float>(sub * sub * sub * hat / width), mu,
-                                       sliverLacks(finest, anchor, normal)});
+                                       sliverLacks(finest, anchor.at, normal)});
                 ++run.count;
             }
         });
@@ -263,7 +271,7 @@ void addCuts(const volume::NodeGrid& cells, const std::vector<volume::CellMateri
 
 bool shareNode(const CellLevel& level, Index3 a, Index3 b) noexcept
 {
-    if (level.fragments.cells.empty()) {
+    if (a == b || level.fragments.cells.empty()) {
         return true;
     }
     const auto nodesOf = [&](Index3 cell) {

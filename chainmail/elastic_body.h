@@ -96,7 +96,8 @@ inline float diagonalOf(float mu, float lambda, double spacing, const Cut& cut, 
            3.0F;
 }
 
-/// Whether no gap divides two cells of the level that lie beside each other: they share one of the nodes between them.
+/// Whether no gap divides two cells of the finest level that lie beside each other: they share one of the nodes between
+/// them.
 bool shareNode(const CellLevel& level, Index3 a, Index3 b) noexcept;
 
 /// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].

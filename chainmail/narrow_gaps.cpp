@@ -15,7 +15,7 @@ namespace palpate::chainmail {
 
 namespace {
 
-// The quarters of cells around a corner of eighths, 4 x 4 x 4, a bit for each, x fastest.
+// Of the 64 parts of cells around a corner of eighths, 4 x 4 x 4 quarters of an edge, a bit for each, x fastest.
 using Quarters = std::uint64_t;
 
 constexpr Quarters firstEighth = 0x00330033;
@@ -78,7 +78,7 @@ public:
         }
         return has;
     }
-    // Whether no cube as large as a cell is in it.
+    // Whether no cube as large as a cell is in it: a layer of voxels of three quarters of a cell is three thick.
     bool isThin() const noexcept
     {
         constexpr std::size_t cube = 4;
@@ -134,8 +134,7 @@ public:
         });
     }
 
-    // First in cells, then between them. A corner of eighths belongs to the cell that it is the lowest corner of, or lies
-    // in.
+    // First in cells, then between them. Each cell has the corners of eighths at its lowest corner and half a cell on.
     void run()
     {
         std::vector<std::uint8_t> owns(nodes_.count(), 0);
@@ -246,7 +245,7 @@ private:
     Sides sidesAt(Index3 corner, Quarters tissue) const
     {
         std::array<Quarters, 8> parts{};  // that the eighths belong to
-        std::optional<Quarters> first;
+        std::optional<Quarters> other;
         bool areSeveral = false;
         for (int i = 0; i < 8; ++i) {
             const Eighth e = eighthAt(corner, i);
@@ -255,8 +254,8 @@ private:
             if (eighth != 0) {
                 const Quarters part = partOf(eighth, tissue);
                 parts[static_cast<std::size_t>(i)] = part;
-                areSeveral = areSeveral || first.value_or(part) != part;
-                first = part;
+                areSeveral = areSeveral || other.value_or(part) != part;
+                other = part;
             }
         }
         return areSeveral ? sidesOf(parts, surroundingsOf(corner)) : Sides{};
@@ -324,8 +323,7 @@ private:
         return (octants[level_.nodes.offset(eighth / 2)] >> octantOf(eighth % 2) & 1) != 0;
     }
 
-    // Those that touch most filled ones, of those that touch one side alone. The whole cell where there is nothing to
-    // touch.
+    // Those that touch most filled ones, of those that touch one side alone; the whole cell where there are none.
     std::uint8_t place(Index3 cell)
     {
         std::array<int, 8> touched{};

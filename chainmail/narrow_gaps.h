@@ -16,6 +16,10 @@ namespace palpate::chainmail {
 /// So no cell has eighths on two sides of a gap. A cell with none left gets those that touch most others, of one side.
 /// - A gap may be as narrow as a quarter of a cell, at any angle. Its end stays closed over two cells.
 /// - The steps of a slanted sheet of one layer of voxels are no gaps: sides without a cube as large as a cell count as one.
+/// Such
+/// a
+///   sheet may be cut at a step within two cells of a thick part.
+/// - An eighth that touches two sides, and has to belong to some, still joins them: some in a thousand bodies have one.
 /// O(cells that have both tissue and air), and 20 us more for each corner where tissue is apart close by.
 /// @param cells      of `materials`: the first cells of the level
 std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,

@@ -20,6 +20,7 @@ struct Piece {
     Index3 cell{0};
     std::uint8_t children = 0;             // cells of the fine level without their fragments, a bit for each
     std::vector<std::uint32_t> fragments;  // of the fine level
+    std::uint32_t middle = 0;              // the fine level's node in the middle of the cell that all of it has
     std::array<std::uint32_t, 8> nodes{};
 };
 
@@ -133,7 +134,7 @@ private:
         }
         std::vector<Piece> found;
         if (const std::uint8_t children = fine_.tissue[coarse_.offset(cell)]; children != 0) {
-            found.push_back({cell, children, {}, {}});
+            found.push_back({cell, children, {}, static_cast<std::uint32_t>(fine_.nodes.offset(2 * cell + 1)), {}});
         }
         for (int i = 0; i < 8; ++i) {
             for (const CellFragment& f : fragmentsIn(2 * cell + octant(i))) {
@@ -150,31 +151,16 @@ private:
         return known->second;
     }
 
-    // Joins a fragment of the fine level and the piece of its coarse cell that it belongs to.
+    // Adds a fragment of the fine level to the piece that has the same node in the middle of the coarse cell, or as one of
+    // its own. So a gap ends at the side of a coarse cell to which its end is nearer.
     void addFragment(const CellFragment& f, std::vector<Piece>& found) const
     {
-        Piece one{f.cell / 2, 0, {}, {}};
-        std::erase_if(found, [&](const Piece& other) {
-            const bool isPart = shareMiddle(other, f);
-            one.children |= isPart ? other.children : std::uint8_t{0};
-            one.fragments.insert(one.fragments.end(), other.fragments.begin(),
-                                 isPart ? other.fragments.end() : other.fragments.begin());
-            return isPart;
-        });
-        one.fragments.push_back(indexOf(f));
-        found.push_back(std::move(one));
-    }
-
-    // Of a coarse cell, by the node in its middle. So a gap ends at the side of a coarse cell to which its end is nearer.
-    bool shareMiddle(const Piece& piece, const CellFragment& f) const
-    {
-        const auto middleOf = [](const CellFragment& g) {
-            return g.nodes[static_cast<std::size_t>(octantOf(1 - g.cell % 2))];
-        };
-        const std::uint32_t own = middleOf(f);
-        return (piece.children != 0 && own == fine_.nodes.offset(2 * piece.cell + 1)) ||
-               std::ranges::any_of(piece.fragments,
-                                   [&](std::uint32_t i) { return middleOf(fine_.fragments.cells[i]) == own; });
+        const std::uint32_t middle = f.nodes[static_cast<std::size_t>(octantOf(1 - f.cell % 2))];
+        auto piece = std::ranges::find(found, middle, &Piece::middle);
+        if (piece == found.end()) {
+            piece = found.insert(piece, {f.cell / 2, 0, {}, middle, {}});
+        }
+        piece->fragments.push_back(indexOf(f));
     }
 
     // Gives the pieces around a node nodes of their own, where they do not hang together there.

@@ -168,7 +168,8 @@ void handDown(Window& coarse, Field field, Window& fine) noexcept
 
 namespace {
 
-// Which nodes move tissue: by how much, at the middle of a cell's tissue, over that in a full cell. In Field::t, 1 or 0.
+// Which nodes move tissue: by how much, at the middle of a cell's tissue, over that in a full cell. In Field::t: 1 or 0,
+// and besideGap as markGaps() has it.
 float* markHolding(Window& w) noexcept
 {
     constexpr float least = 0.1F;

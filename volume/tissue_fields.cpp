@@ -358,6 +358,9 @@ template <typename Scale>
 std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& grid, const Scale& scale)
 {
     constexpr double full = 1.0 - 1e-6;  // fraction of a cell that is all of it
+    constexpr double finest = 0.76;      // voxels that show more of gaps than eighths do, at most [cells]
+    const Vec3 voxel = tissue.affine.spacing();
+    const bool isFine = std::max({voxel.x, voxel.y, voxel.z}) <= finest * grid.spacing;
     checkGrid(grid);
     std::vector<const TissueRow*> rows(65536, nullptr);
     for (const Structure& s : tissue.structures) {
@@ -379,7 +382,7 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                     cell.quarters = 0;
                 } else if (mixture.fraction() < full) {
                     cell.octants = sampler.octants(n, isTissue);
-                    cell.quarters = sampler.quarters(n, isTissue);
+                    cell.quarters = isFine ? sampler.quarters(n, isTissue) : cell.quarters;
                 }
                 const auto insideFaces = [&] { return sampler.insideFaces(n, isTissue); };
                 const auto scaled = static_cast<float>(scale(at, mixture.fraction(), insideFaces));

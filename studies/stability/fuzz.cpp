@@ -30,9 +30,9 @@ constexpr double forceRounding = 1e-9;  // of the cap
 constexpr double slewPerSecond = 50.0;
 constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
 // A body of each sort: all others are these again, turned or thicker.
-constexpr std::array<const char*, 11> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
-                                             "tumour-step", "puncture-energy", "wall-rest",   "let-go",
-                                             "deep-press",  "capsule-retreat", "thin-pinch"};
+constexpr std::array<const char*, 13> scenes{
+    "plate-1mm", "outer-60deg", "inner-60deg",     "slide-30deg-20mm_s", "tumour-step", "puncture-energy", "wall-rest",
+    "let-go",    "deep-press",  "capsule-retreat", "thin-pinch",         "slit-drag",   "flap-drag"};
 constexpr double minPull = 0.01;      // of the cap
 constexpr double fastestHand = 10.0;  // [m/s]
 constexpr double flatWithin = 0.95;   // cosine between normals of a face that is flat

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 namespace palpate::studies {
@@ -394,6 +395,45 @@ void addThin(std::vector<StabilityScene>& out)
     out.push_back(again(pinch, "thin-retreat", noPull, noPull));
 }
 
+// Adds a drag, and the same body pressed at its end and drawn back.
+void addDragAndRetreat(std::vector<StabilityScene>& out, StabilityScene drag, const std::string& retreat)
+{
+    drag.held = drag.released = {Figure::forceStep, stepBound};
+    drag.letGo = drag.hand.end(1) - 0.1;
+    drag.quick = true;
+    out.push_back(drag);
+    out.push_back(again(drag, retreat, noPull, noPull));
+}
+
+// Gaps of few voxels: a slit in fat that lies at 25 degrees to the voxels, and a flap of skin, one voxel thick, over fat.
+void addGaps(std::vector<StabilityScene>& out)
+{
+    constexpr double thickness = 20, half = 20, deep = 4.5 - thickBall, up = -thickBall - 2;
+    const auto bodyWith = [&](const std::function<bool(Vec3)>& isGap, double skin) {
+        return smallBody({-half - 2, -8, -half - 2}, {half + 2, thickness + 5, half + 2}, [=](Vec3 p) {
+            const bool inside = p.y > 0 && p.y < thickness + 4 && std::max(std::abs(p.x), std::abs(p.z)) < half;
+            return !inside || isGap(p) ? BodyLabel{} : p.y > thickness ? bodyBase : p.y < skin ? bodySkin : bodyFat;
+        });
+    };
+    const double angle = 25 * std::numbers::pi / 180;
+    const Vec3 across(std::cos(angle), 0, std::sin(angle)), down(0, deep, 0), above(0, up, 0);
+    const auto slit = bodyWith([=](Vec3 p) { return std::abs(glm::dot(p, across)) < 1 && p.y < 14; }, 0);
+    addDragAndRetreat(
+        out,
+        scene("slit-drag", "slit", "dragged across a slit in fat, 2 mm wide, and drawn back", slit, thickBall,
+              {above - 12.0 * across,
+               {{down - 12.0 * across, 40, 0.1}, {down + 12.0 * across, 20, 0.2}, {above + 12.0 * across, 60, 0.1}}}),
+        "slit-retreat");
+    constexpr double root = -6;
+    const Vec3 along(12, 0, 0);
+    const auto flap = bodyWith([=](Vec3 p) { return p.x > root && p.y > 1 && p.y < 4; }, 1);
+    addDragAndRetreat(
+        out,
+        scene("flap-drag", "flap", "dragged from skin on fat onto a flap of it, 1 mm thick, and drawn back", flap,
+              thickBall, {above - along, {{down - along, 40, 0.1}, {down + along, 20, 0.2}, {above + along, 60, 0.1}}}),
+        "flap-retreat");
+}
+
 struct FigureText {
     std::string_view name, unit;
 };
@@ -471,6 +511,7 @@ std::vector<StabilityScene> stabilityScenes()
     addDeep(out, block);
     addCapsule(out, block);
     addThin(out);
+    addGaps(out);
     return out;
 }
 

@@ -292,7 +292,7 @@ TEST(FinestGaps, ASlantedSheetOfOneVoxelIsNotCut)
     for (int i = 0; i < 16; ++i) {
         const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
         const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
-        const double voxel = i % 2 == 0 ? 0.5 : 0.66;
+        const double voxel = std::array{0.5, 0.66, 0.75}[static_cast<std::size_t>(i % 3)];
         const double thick = voxel * std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
         const auto isFilled = [&](Vec3 p) {
             const Vec3 ofVoxel = voxel * (glm::floor(p / voxel) + 0.5);
@@ -370,6 +370,35 @@ TEST(FinestGaps, AWallMovesWithItsOwnSide)
         }
     }
     EXPECT_GT(points, 1000U);
+}
+
+// The outer face of a flap of half a cell, with a gap of half a cell under it, moves with the flap, and has its stiffness.
+TEST(FinestGaps, TheFaceOfAThinFlapMovesWithTheFlap)
+{
+    const volume::NodeGrid grid{Index3(14), Vec3(-2.5 * edge), edge};
+    std::vector<volume::CellMaterial> materials(grid.count());
+    volume::forEachIndex(Index3(0), Index3(7), [&](Index3 c) {
+        materials[grid.offset(c + 3)] = sampled(c, c.x < 2, [](Vec3 p) { return p.y < 0.5 || p.y > 1.0; });
+        materials[grid.offset(c + 3)].youngsModulus *= c.y == 0 ? 3.0F : 1.0F;
+    });
+    const volume::NodeGrid fine{Index3(53), Vec3(-2.5 * edge), 0.25 * edge};
+    const auto surface = tests::distanceOn(fine, [&](Vec3 p) {
+        const double flap = tests::boxDistance(p, Vec3(0.0), Vec3(8.0, 0.5, 8.0) * edge);
+        return std::min(flap, tests::boxDistance(p, Vec3(0.0, 1.0, 0.0) * edge, Vec3(8 * edge)));
+    });
+    const ElasticBody body = elasticBody(grid, materials, surface, 0.49);
+    const CellLevel& level = body.levels.front();
+    int points = 0;
+    for (const SurfacePoint& p : body.points) {
+        const bool isInner =
+            p.position.x > 2.5 * edge && p.position.x < 6 * edge && std::abs(p.position.z - 4 * edge) < 2 * edge;
+        if (isInner && p.normal.y < -0.9F && p.position.y < 0.2 * edge) {
+            EXPECT_EQ(level.nodes.cellAt(Vec3(p.anchor)).y, level.nodes.cellAt(Vec3(0.5 * edge)).y);
+            EXPECT_GT(p.mu, 2.0F * level.mu[level.nodes.offset(level.nodes.cellAt(Vec3(5.5 * edge)))]);
+            ++points;
+        }
+    }
+    EXPECT_GT(points, 20);
 }
 
 }  // namespace
