@@ -19,7 +19,7 @@ namespace palpate::chainmail {
 /// Such
 /// a
 ///   sheet may be cut at a step within two cells of a thick part.
-/// - An eighth that touches two sides, and has to belong to some, still joins them: some in a thousand bodies have one.
+/// - A cell whose eighths all touch two sides joins them.
 /// O(cells that have both tissue and air), and 20 us more for each corner where tissue is apart close by.
 /// @param cells      of `materials`: the first cells of the level
 std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,

@@ -20,7 +20,6 @@ struct Piece {
     Index3 cell{0};
     std::uint8_t children = 0;             // cells of the fine level without their fragments, a bit for each
     std::vector<std::uint32_t> fragments;  // of the fine level
-    std::uint32_t middle = 0;              // the fine level's node in the middle of the cell that all of it has
     std::array<std::uint32_t, 8> nodes{};
 };
 
@@ -134,7 +133,7 @@ private:
         }
         std::vector<Piece> found;
         if (const std::uint8_t children = fine_.tissue[coarse_.offset(cell)]; children != 0) {
-            found.push_back({cell, children, {}, static_cast<std::uint32_t>(fine_.nodes.offset(2 * cell + 1)), {}});
+            found.push_back({cell, children, {}, {}});
         }
         for (int i = 0; i < 8; ++i) {
             for (const CellFragment& f : fragmentsIn(2 * cell + octant(i))) {
@@ -151,16 +150,43 @@ private:
         return known->second;
     }
 
-    // Adds a fragment of the fine level to the piece that has the same node in the middle of the coarse cell, or as one of
-    // its own. So a gap ends at the side of a coarse cell to which its end is nearer.
+    // Joins a fragment of the fine level and the pieces of its coarse cell that share a node with it.
     void addFragment(const CellFragment& f, std::vector<Piece>& found) const
     {
-        const std::uint32_t middle = f.nodes[static_cast<std::size_t>(octantOf(1 - f.cell % 2))];
-        auto piece = std::ranges::find(found, middle, &Piece::middle);
-        if (piece == found.end()) {
-            piece = found.insert(piece, {f.cell / 2, 0, {}, middle, {}});
+        Piece one{f.cell / 2, 0, {}, {}};
+        std::erase_if(found, [&](const Piece& other) {
+            const bool isPart = shareNode(other, f);
+            one.children |= isPart ? other.children : std::uint8_t{0};
+            one.fragments.insert(one.fragments.end(), other.fragments.begin(),
+                                 isPart ? other.fragments.end() : other.fragments.begin());
+            return isPart;
+        });
+        one.fragments.push_back(indexOf(f));
+        found.push_back(std::move(one));
+    }
+
+    bool shareNode(const Piece& piece, const CellFragment& f) const
+    {
+        return std::ranges::any_of(f.nodes, [&](std::uint32_t node) {
+            const auto has = [&](std::uint32_t other) {
+                const auto& nodes = fine_.fragments.cells[other].nodes;
+                return std::ranges::find(nodes, node) != nodes.end();
+            };
+            return (!isVirtual(node) && isCorner(piece, fine_.nodes.node(node))) ||
+                   std::ranges::any_of(piece.fragments, has);
+        });
+    }
+
+    // Whether a node of the fine level is one of the piece's whole cells.
+    static bool isCorner(const Piece& piece, Index3 node)
+    {
+        for (int i = 0; i < 8; ++i) {
+            const Index3 off = node - (2 * piece.cell + octant(i));
+            if ((piece.children >> i & 1) != 0 && off == glm::clamp(off, Index3(0), Index3(1))) {
+                return true;
+            }
         }
-        piece->fragments.push_back(indexOf(f));
+        return false;
     }
 
     // Gives the pieces around a node nodes of their own, where they do not hang together there.

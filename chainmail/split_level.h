@@ -25,10 +25,9 @@ std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<
 Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose,
                   const std::vector<std::uint8_t>& octants);
 
-/// Finds which tissue hangs together in the cells of the next coarser level, by the fine level's node in their middle, and
-/// around its nodes, by those at or beside them. The rest gets fragments and virtual nodes. Where two parts meet at a node,
-/// the one of more cells keeps it; loose cells never leave it. O(cells of the coarse level), and more for those at the
-/// surface.
+/// Finds which tissue hangs together in the cells of the next coarser level and around its nodes. What shares a node of the
+/// fine level does; the rest gets fragments and virtual nodes. Where two parts meet at a node, the one of more cells keeps
+/// it; loose cells never leave it. O(cells of the coarse level), and more for those at the surface.
 /// @param coarse  every second node of the fine level
 /// @param loose   not 0 for cells of the fine level that hang together with nothing held (count x 1)
 Split splitLevel(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse);
