@@ -177,8 +177,8 @@ public:
         return static_cast<std::uint8_t>(found);
     }
 
-    // Which of the 64 parts of a node's cell have tissue in their middle: CellMaterial::quarters. Between voxels far
-    // smaller than the parts, by the nearest one.
+    // Which of the 64 parts of a node's cell have tissue in their middle: CellMaterial::quarters. Where a cell
+    // is wider than some eight voxels, by the nearest one.
     template <typename IsTissue>
     std::uint64_t quarters(Index3 n, const IsTissue& isTissue) const
     {

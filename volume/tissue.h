@@ -76,7 +76,7 @@ struct CellMaterial {
     /// Which of its eighths are mostly tissue, a bit for each, x fastest; none may be where little of it is tissue.
     std::uint8_t octants = 0xFF;
     /// Which of its 64 parts, a quarter of an edge wide, have tissue in their middle, a bit for each, x fastest; all of
-    /// them where voxels are as large as cells.
+    /// them where voxels are longer than three quarters of a cell.
     std::uint64_t quarters = ~std::uint64_t{0};
 };
 
