@@ -69,6 +69,7 @@ public:
         coarse.cutRows = rowsOf(coarse.cuts, coarse.nodes.size, &CutCell::cell);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
                              [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = isFixed(2 * n) ? 1 : 0; });
+        holdThin(fine_, coarse);
         fixFragments(coarse);
         return coarse;
     }

@@ -1,14 +1,12 @@
 #pragma once
 
 #include <chainmail/elastic_body.h>
+#include <chainmail/held_nodes.h>
 
 #include <optional>
 #include <vector>
 
 namespace palpate::chainmail {
-
-/// Fraction of a cell that is held from which on all of it is: bone, but for the rounding of samples.
-inline constexpr float whollyHeld = 0.98F;
 
 /// A cell of several tissues, see volume::CellMaterial.
 struct MixedCell {

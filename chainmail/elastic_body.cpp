@@ -2,6 +2,7 @@
 
 #include <chainmail/cell_levels.h>
 #include <chainmail/cut_cells.h>
+#include <chainmail/held_nodes.h>
 #include <chainmail/narrow_gaps.h>
 #include <volume/relaxation.h>
 
@@ -18,9 +19,8 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr int fewestNodes = 9;      // the coarsest level has at most as many along each side
-constexpr double cellUnder = 0.6;   // depth under the surface at which a place's tissue is taken [cells]
-constexpr float minTissue = 0.01F;  // cells with less of a typical stiffness are empty
+constexpr int fewestNodes = 9;     // the coarsest level has at most as many along each side
+constexpr double cellUnder = 0.6;  // depth under the surface at which a place's tissue is taken [cells]
 
 // Nodes along each side, so that every level has whole cells: a multiple of 2^(levels - 1) cells.
 Index3 paddedNodes(Index3 cells, int& levels)
@@ -34,25 +34,6 @@ Index3 paddedNodes(Index3 cells, int& levels)
     return (cells + unit - 1) / unit * unit + 1;
 }
 
-// Nodes around which half of the tissue is held: where the surface of bone runs through cells, those on its side of it.
-std::vector<std::uint8_t> mostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                                     const volume::NodeGrid& nodes)
-{
-    std::vector<std::uint8_t> out(nodes.count(), 0);
-    volume::forEachIndex(Index3(0), cells.size, [&](Index3 n) {
-        float held = 0.0F;
-        float filled = 0.0F;
-        volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, cells.size - 1), [&](Index3 c) {
-            const auto& m = materials[cells.offset(c)];
-            const float tissue = m.youngsModulus > minTissue ? m.fraction : 0.0F;
-            held += m.fixed * tissue;
-            filled += tissue;
-        });
-        out[nodes.offset(n)] = held > 0.0F && held >= 0.5F * whollyHeld * filled ? 1 : 0;
-    });
-    return out;
-}
-
 volume::Relaxation relaxationOf(const volume::CellMaterial& material, bool relaxes)
 {
     volume::Relaxation relaxation;
@@ -62,7 +43,7 @@ volume::Relaxation relaxationOf(const volume::CellMaterial& material, bool relax
     return relaxation;
 }
 
-FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, double poissonCap,
+FinestLevel finest(const volume::NodeGrid& cells, std::vector<volume::CellMaterial>& materials, double poissonCap,
                    Index3 size, bool relaxes)
 {
     FinestLevel all;
@@ -71,7 +52,7 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     level.mu.assign(level.nodes.count(), 0.0F);
     level.lambda.assign(level.nodes.count(), 0.0F);
     level.stiffening.assign(level.nodes.count(), 0.0F);
-    all.mostlyHeld = mostlyHeld(cells, materials, level.nodes);
+    all.mostlyHeld = heldNodes(cells, level.nodes, materials);
     level.fixed = all.mostlyHeld;
     all.held.assign(level.nodes.count(), 0.0F);
     for (auto& weights : level.relaxing) {
@@ -286,7 +267,7 @@ bool shareNode(const CellLevel& level, Index3 a, Index3 b) noexcept
     return std::ranges::any_of(nodesOf(a), [&](std::uint32_t n) { return std::ranges::find(other, n) != other.end(); });
 }
 
-ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
+ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellMaterial> materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius, bool relaxes,
                         const std::optional<volume::Support>& support)
 {

@@ -150,7 +150,7 @@ struct ElasticBody {
 /// every spacing, the nodes on it or behind it where the body meets it. Something must be held.
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
-ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
+ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellMaterial> materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0,
                         bool relaxes = false, const std::optional<volume::Support>& support = {});
 

@@ -91,8 +91,9 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
     auto materials = tissue.materialOn(cells, surface);
     chainmail::holdLoosePieces(cells, materials, tissue.support());
-    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(
-        cells, materials, surface, scene.model.elastic.poissonCap, presses, scene.model.relaxation, tissue.support()));
+    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, std::move(materials), surface,
+                                                                           scene.model.elastic.poissonCap, presses,
+                                                                           scene.model.relaxation, tissue.support()));
 }
 
 bool anyWalls(const volume::Tissue& tissue)

@@ -99,6 +99,9 @@ CellMaterial CellMixture::material() const noexcept
                           Vec3f(layer.middle),
                           static_cast<float>(layer.share),
                           Vec3f(layer.normal)};
+    if (held_.fraction > 0.0) {
+        material.held.middle = Vec3f(held_.byWeight.first / held_.fraction);
+    }
     for (std::size_t i = 0; i < relaxing_.size() && free_.fraction > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing_[i] / free_.fraction);
     }

@@ -177,38 +177,29 @@ public:
         return static_cast<std::uint8_t>(found);
     }
 
-    // Which of the 64 parts of a node's cell have tissue in their middle: CellMaterial::quarters. Where a cell
-    // is wider than some eight voxels, by the nearest one.
+    // Which of the 64 parts of a node's cell have tissue in their middle: CellMaterial::quarters.
     template <typename IsTissue>
     std::uint64_t quarters(Index3 n, const IsTissue& isTissue) const
     {
-        constexpr std::size_t most = 512;
-        const Vec3 centre = start_ + step_ * Vec3(n);
-        const Vec3 reach = 0.375 * (glm::abs(step_[0]) + glm::abs(step_[1]) + glm::abs(step_[2])) + 1e-6;
-        const Index3 low(glm::floor(centre - reach)), size = Index3(glm::floor(centre + reach)) + 2 - low;
-        std::array<double, most> near;
-        const auto tissueAt = [&](Index3 voxel) {
-            bool is = false;
-            read(voxel, 1.0, Vec3(0.0), [&](std::uint16_t label, double) { is = isTissue(label); });
-            return is ? 1.0 : 0.0;
-        };
-        const bool isNear = base::countOf(size) <= most;
-        if (isNear) {
-            forEachIndex(Index3(0), size - 1, [&](Index3 at) { near[base::offsetOf(size, at)] = tissueAt(low + at); });
-        }
         std::uint64_t found = 0;
-        for (int i = 0; i < 64; ++i) {
-            const Vec3 at = centre + step_ * (0.25 * Vec3(i & 3, i >> 2 & 3, i >> 4) - 0.375);
-            double tissue = 0.0;
-            if (isNear) {
-                forEachCorner(at, [&](Index3 voxel, Vec3 share, Vec3) {
-                    tissue += share.x * share.y * share.z * near[base::offsetOf(size, voxel - low)];
-                });
-            } else {
-                tissue = tissueAt(Index3(glm::round(at)));
-            }
-            found |= tissue >= 0.5 - 1e-9 ? std::uint64_t{1} << i : std::uint64_t{0};
-        }
+        const auto middleOf = [](int i) { return 0.25 * Vec3(i & 3, i >> 2 & 3, i >> 4) - 0.375; };
+        forEachInside<64>(n, 0.375, middleOf, isTissue, [&](int i) { found |= std::uint64_t{1} << i; });
+        return found;
+    }
+
+    // Which eighths of the edges of a node's cell have tissue in their middle: HeldParts::edges.
+    template <typename IsTissue>
+    std::array<std::uint8_t, HeldParts::edgeCount> onEdges(Index3 n, const IsTissue& isTissue) const
+    {
+        std::array<std::uint8_t, HeldParts::edgeCount> found{};
+        const auto middleOf = [](int i) {
+            Vec3 at = Vec3(HeldParts::startOf(i / 8)) - 0.5;
+            at[i / 32] += (i % 8 + 0.5) / 8.0;
+            return at;
+        };
+        forEachInside<8 * HeldParts::edgeCount>(n, 0.5, middleOf, isTissue, [&](int i) {
+            found[static_cast<std::size_t>(i / 8)] |= static_cast<std::uint8_t>(1U << i % 8);
+        });
         return found;
     }
 
@@ -307,6 +298,41 @@ private:
         const double fraction = 1.0 / static_cast<double>(offsets_.size());
         for (std::size_t i = 0; i < offsets_.size(); ++i) {
             visit(centre + offsets_[i], fraction, places_[i]);
+        }
+    }
+
+    // Calls found(i) for those of `count` places that lie in tissue, halfway between voxels. Where a cell is wider than
+    // some eight voxels, in the nearest one. placeOf(i): from the node, up to `reach` along each axis [cells].
+    template <int count, typename PlaceOf, typename IsTissue, typename Found>
+    void forEachInside(Index3 n, double reach, const PlaceOf& placeOf, const IsTissue& isTissue, const Found& found) const
+    {
+        constexpr std::size_t most = 512;
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const Vec3 wide = reach * (glm::abs(step_[0]) + glm::abs(step_[1]) + glm::abs(step_[2])) + 1e-6;
+        const Index3 low(glm::floor(centre - wide)), size = Index3(glm::floor(centre + wide)) + 2 - low;
+        std::array<double, most> near;
+        const auto tissueAt = [&](Index3 voxel) {
+            bool is = false;
+            read(voxel, 1.0, Vec3(0.0), [&](std::uint16_t label, double) { is = isTissue(label); });
+            return is ? 1.0 : 0.0;
+        };
+        const bool isNear = base::countOf(size) <= most;
+        if (isNear) {
+            forEachIndex(Index3(0), size - 1, [&](Index3 at) { near[base::offsetOf(size, at)] = tissueAt(low + at); });
+        }
+        for (int i = 0; i < count; ++i) {
+            const Vec3 at = centre + step_ * placeOf(i);
+            double tissue = 0.0;
+            if (isNear) {
+                forEachCorner(at, [&](Index3 voxel, Vec3 share, Vec3) {
+                    tissue += share.x * share.y * share.z * near[base::offsetOf(size, voxel - low)];
+                });
+            } else {
+                tissue = tissueAt(Index3(glm::round(at)));
+            }
+            if (tissue >= 0.5 - 1e-9) {
+                found(i);
+            }
         }
     }
 

@@ -56,6 +56,23 @@ struct CompanionImage {
     StiffnessMap stiffness;     // what it does to Young's modulus
 };
 
+/// Where in a cell tissue lies that is held in space, of cells with such tissue.
+struct HeldParts {
+    static constexpr int edgeCount = 12;
+    /// Which eighths of each edge it lies on, a bit for each from the edge's lower end on. Edge `e` runs along axis e / 4.
+    std::array<std::uint8_t, edgeCount> edges{};
+    Vec3f middle{0.0F};  // of it, -1 to 1 along each edge of the cell
+
+    /// Lower end of an edge in its cell, 0 or 1 along each axis.
+    static Index3 startOf(int edge) noexcept
+    {
+        Index3 start(0);
+        start[(edge / 4 + 1) % 3] = edge & 1;
+        start[(edge / 4 + 2) % 3] = edge >> 1 & 1;
+        return start;
+    }
+};
+
 /// The tissue in a cell as one elastic material.
 struct CellMaterial {
     /// Root of arithmetic times harmonic mean, times the fraction of the cell that is tissue; where some of it is held in
@@ -78,6 +95,7 @@ struct CellMaterial {
     /// Which of its 64 parts, a quarter of an edge wide, have tissue in their middle, a bit for each, x fastest; all of
     /// them where voxels are longer than three quarters of a cell.
     std::uint64_t quarters = ~std::uint64_t{0};
+    HeldParts held{};
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.

@@ -367,6 +367,7 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
         rows[s.value] = tissue.lookup.solid[s.value] != 0 ? &tissue.table.rows[s.tissue] : nullptr;
     }
     const auto isTissue = [&](std::uint16_t label) { return rows[label] != nullptr; };
+    const auto isHeld = [&](std::uint16_t label) { return rows[label] != nullptr && rows[label]->fixed; };
     std::vector<CellMaterial> cells(grid.count());
     const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
     forEachRow(
@@ -383,6 +384,9 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 } else if (mixture.fraction() < full) {
                     cell.octants = sampler.octants(n, isTissue);
                     cell.quarters = isFine ? sampler.quarters(n, isTissue) : cell.quarters;
+                }
+                if (cell.fixed > 0.0F) {
+                    cell.held.edges = sampler.onEdges(n, isHeld);
                 }
                 const auto insideFaces = [&] { return sampler.insideFaces(n, isTissue); };
                 const auto scaled = static_cast<float>(scale(at, mixture.fraction(), insideFaces));

@@ -1,4 +1,5 @@
 #include "elastic_bodies.h"
+#include "voxel_body.h"
 
 #include <gtest/gtest.h>
 
@@ -195,42 +196,10 @@ TEST(ElasticContact, TheBoundOfItsStiffnessIsNotFeltOnStiffTissue)
     EXPECT_NEAR(pressedForce(body, options, top, 10e-3, 5e-3, ElasticTool().stiffest) / free, 1.0, 0.04);
 }
 
-// A body of voxels of 1 mm as a session makes it: materials and surface from the label map. `label(p)` is 0 for air, 1 for
-// soft tissue and 2 for a board that is held [m].
-template <typename Label>
-ElasticBody voxelBody(Index3 size, Vec3 low, double spacing, const Label& label)
-{
-    volume::TissueTable table;
-    table.rows.resize(3);
-    table.name = "block";
-    const auto set = [&](std::size_t row, const char* name, volume::Role role, double e) {
-        table.rows[row].name = name;
-        table.rows[row].role = role;
-        table.rows[row].youngsModulus = e;
-        table.rows[row].poissonRatio = 0.45;
-        table.rows[row].fixed = role == volume::Role::bone;
-    };
-    set(0, "air", volume::Role::air, 0.0);
-    set(1, "soft", volume::Role::plain, 1e4);
-    set(2, "board", volume::Role::bone, 1e4);
-    volume::LabelImage image{size, {}, {}};
-    image.affine.linear = Mat3(1e-3);
-    image.affine.origin = low + 0.5e-3;
-    image.values.assign(image.offset({0, 0, image.size.z}), 0);
-    volume::forEachIndex(Index3(0), size - 1, [&](Index3 v) {
-        image.values[image.offset(v)] = static_cast<std::uint16_t>(label(image.affine.toPatient(Vec3(v))));
-    });
-    const std::array<volume::LabelName, 2> names{{{1, "soft", "soft"}, {2, "board", "board"}}};
-    const auto tissue = volume::Tissue::fromLabels(image, table, names, {});
-    const auto grid = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
-    const auto surface = tissue.distanceToBody(volume::coveringGrid(tissue.box(), 1e-3, 4e-3));
-    return elasticBody(grid, tissue.materialOn(grid, surface), surface, 0.49);
-}
-
 // Its faces lie between nodes.
 ElasticBody voxelBlock(double spacing)
 {
-    return voxelBody(Index3(68, 48, 68), Vec3(-4e-3), spacing, [](Vec3 p) {
+    return tests::voxelBody(Index3(68, 48, 68), Vec3(-4e-3), spacing, [](Vec3 p) {
         const bool inside = p.x > 0.0 && p.x < 60e-3 && p.y > 0.0 && p.y < 40e-3 && p.z > 0.0 && p.z < 60e-3;
         return !inside ? 0 : p.y > 38e-3 ? 2 : 1;
     });
@@ -287,7 +256,7 @@ TEST(ElasticContact, ATurnedSlabOfVoxelsHasOneForce)
         constexpr double depth = 1.5e-3;
         const double angle = degrees * std::numbers::pi / 180.0;
         const Vec3 in(std::sin(angle), std::cos(angle), 0.0), along(std::cos(angle), -std::sin(angle), 0.0);
-        const ElasticBody body = voxelBody(Index3(100, 96, 84), Vec3(-50e-3, -40e-3, -42e-3), 2e-3, [&](Vec3 p) {
+        const ElasticBody body = tests::voxelBody(Index3(100, 96, 84), Vec3(-50e-3, -40e-3, -42e-3), 2e-3, [&](Vec3 p) {
             const double deep = glm::dot(p, in);
             const bool inside = deep > 0.0 && deep < 34e-3 && std::max(std::abs(glm::dot(p, along)), std::abs(p.z)) < 36e-3;
             return !inside ? 0 : deep > 30e-3 ? 2 : 1;

@@ -1,5 +1,7 @@
 #include <volume/cell_mixture.h>
 
+#include "bodies.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -167,6 +169,50 @@ TEST(CellMixture, KnowsTheNormalOfItsLayers)
     }
     EXPECT_EQ(fill([](Vec3) { return true; }), Vec3(0.0));
     EXPECT_EQ(fill([](Vec3 at) { return glm::length(at) < 0.6; }), Vec3(0.0));
+}
+
+// A plate of bone through soft tissue, 0 to 2 mm along an axis, of voxels of 1 mm.
+Tissue bonePlate(int axis)
+{
+    const Index3 size(24);
+    LabelImage image{size, bodies::centred({Mat3(1e-3), Vec3(0.0)}, size), {}};
+    image.values.assign(image.offset({0, 0, size.z}), 1);
+    forEachIndex(Index3(0), size - 1,
+                 [&](Index3 n) { image.values[image.offset(n)] = n[axis] == 12 || n[axis] == 13 ? 300 : 1; });
+    return Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+}
+
+// Which eighths of an edge have their middle in the plate. @param start  of the edge [m]
+unsigned plateOn(Vec3 start, double spacing, int along, int axis)
+{
+    unsigned on = 0;
+    for (int k = 0; k < 8; ++k) {
+        Vec3 at = start;
+        at[along] += spacing * (k + 0.5) / 8.0;
+        on |= at[axis] > 0.0 && at[axis] < 2e-3 ? 1U << k : 0U;
+    }
+    return on;
+}
+
+TEST(CellMixture, BoneLiesOnTheEdgesThatItCrosses)
+{
+    for (int axis = 0; axis < 3; ++axis) {
+        const NodeGrid cells{Index3(4), Vec3(-4.2e-3), 3e-3};
+        const auto materials = bonePlate(axis).materialOn(cells);
+        for (std::size_t i = 0; i < materials.size(); ++i) {
+            const Vec3 low = cells.position(cells.node(i)) - 1.5e-3;
+            for (int e = 0; e < HeldParts::edgeCount && materials[i].fixed > 0.0F; ++e) {
+                const unsigned on = plateOn(low + 3e-3 * Vec3(HeldParts::startOf(e)), 3e-3, e / 4, axis);
+                EXPECT_EQ(materials[i].held.edges[static_cast<std::size_t>(e)], on) << axis << " " << i << " " << e;
+            }
+            const double from = std::max(0.0, low[axis]), to = std::min(2e-3, low[axis] + 3e-3);
+            if (to - from > 0.5e-3) {
+                Vec3 middle(0.0);
+                middle[axis] = (0.5 * (from + to) - low[axis]) / 1.5e-3 - 1.0;
+                EXPECT_LT(glm::length(Vec3(materials[i].held.middle) - middle), 0.2) << axis << " " << i;
+            }
+        }
+    }
 }
 
 }  // namespace
