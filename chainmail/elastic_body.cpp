@@ -2,6 +2,7 @@
 
 #include <chainmail/cell_levels.h>
 #include <chainmail/cut_cells.h>
+#include <chainmail/free_way.h>
 #include <chainmail/held_nodes.h>
 #include <chainmail/narrow_gaps.h>
 #include <volume/relaxation.h>
@@ -275,6 +276,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellM
     body.relaxes = relaxes;
     int levels = 1;
     const Index3 size = paddedNodes(cells.size, levels);
+    findStops(cells, materials, {size, cells.origin - 0.5 * cells.spacing, cells.spacing}, body);
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
     all.octants = octantsOf(cells, materials, all.level);
     addCuts(cells, materials, surface, all.level);
@@ -282,7 +284,6 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellM
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     addSubsurface(surface, body.levels.front(), body);
     body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
-    body.held = std::move(all.held);
     return body;
 }
 

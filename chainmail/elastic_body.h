@@ -123,6 +123,12 @@ inline double poissonAt(const CellLevel& level, Vec3 at) noexcept
     return level.nodes.contains(cell) && mu > 0.0 ? 0.5 * lambda / (lambda + mu) : softPoisson;
 }
 
+/// Bone in a cell of the finest level that no cell of bone alone is beside.
+struct ThinBone {
+    Index3 cell{0};
+    std::array<std::uint8_t, volume::HeldParts::edgeCount> edges{};  // HeldParts::edges
+};
+
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
 /// before, and its nodes are every second node of it.
 struct ElasticBody {
@@ -133,8 +139,11 @@ struct ElasticBody {
     std::vector<SubsurfaceNode> subsurface;     // by z, then y, then x
     std::vector<std::uint32_t> subsurfaceRows;  // see rowsOf()
     double pieceEdge = 0;                       // of the sub-cells of which each of them stands for the surface [m]
-    std::vector<float> held;  // of each cell of the finest level, what share of its tissue is held in space
-    bool relaxes = false;     // its moduli are those right after a step
+    std::vector<float> held;              // of each cell of the finest level, what share of its tissue is held in space
+    std::vector<float> thick;             // the same but of thin bone; empty: as `held`
+    std::vector<ThinBone> thinBone;       // by z, then y, then x
+    std::vector<std::uint32_t> thinRows;  // see rowsOf()
+    bool relaxes = false;                 // its moduli are those right after a step
 };
 
 /// @param cells        centres of the finest level's cells; two layers of cells at its border must be empty: a surface that

@@ -1,6 +1,7 @@
 #include <chainmail/held_tool.h>
 
-#include <glm/common.hpp>
+#include <chainmail/free_way.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -25,56 +26,7 @@ constexpr double deeperBy = 1.0;     // as if its radius were at most so many ce
 constexpr double backBy = 2.5;       // beyond a limit tissue slips around it, so it goes back faster
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr double still = 0.05;       // change of a tool's depth in a call that its patch does not follow, of the depth
-constexpr int maxSteps = 256;        // along a way through the tissue
 constexpr double stop = 4e3;         // of what is held, stiffness [N/m]
-constexpr double mostHeld = 0.5;     // fraction of the tissue around a place that is held, from which on the place is
-constexpr int pieces = 4;            // of a capsule, between places at which it may meet what is held
-
-// Fraction of the tissue around a place that is held, between the middles of cells. 0 outside of the grid.
-double heldAt(const ElasticBody& body, Vec3 at) noexcept
-{
-    const auto& grid = body.levels.front().nodes;
-    const Vec3 cells = (at - grid.origin) / grid.spacing - 0.5;
-    const Index3 low(glm::floor(cells));
-    if (!grid.contains(low) || !grid.contains(low + 1)) {
-        return 0.0;
-    }
-    const auto fraction = trilinear(cells - Vec3(low));
-    double sum = 0.0;
-    for (int i = 0; i < 8; ++i) {
-        sum += static_cast<double>(fraction[static_cast<std::size_t>(i)] * body.held[grid.offset(low + octant(i))]);
-    }
-    return sum;
-}
-
-// How far a place gets on its way until most of the tissue is held [m].
-double freeWay(const ElasticBody& body, Vec3 from, Vec3 inward, double way) noexcept
-{
-    const double step = std::max(0.25 * body.levels.front().nodes.spacing, way / maxSteps);
-    double before = 0.0;
-    for (double t = 0.0; t < way + step; t += step) {
-        const double here = heldAt(body, from + t * inward);
-        if (here >= mostHeld) {
-            return here > before ? std::max(t - step * (here - mostHeld) / (here - before), 0.0) : t;
-        }
-        before = here;
-    }
-    return way;
-}
-
-// The same of a tool from where it would lie on the surface at rest: of its front, along its length.
-double freeWay(const ElasticBody& body, const ElasticTool& tool, Vec3 inward, double way) noexcept
-{
-    const occupancy::RoundCone& s = tool.shape;
-    const int places = s.a == s.b ? 0 : pieces;
-    double least = way;
-    for (int i = 0; i <= places; ++i) {
-        const double t = places > 0 ? static_cast<double>(i) / places : 0.0;
-        const Vec3 front = glm::mix(s.a, s.b, t) + glm::mix(s.radiusA, s.radiusB, t) * inward;
-        least = std::min(least, freeWay(body, front - tool.pushed, inward, least));
-    }
-    return least;
-}
 
 }  // namespace
 

@@ -195,6 +195,35 @@ TEST(HeldNodes, APlatePartsWiderLevelsToo)
     }
 }
 
+// Force on a ball that is pressed 5 mm through soft tissue and 2 mm into bone of this thickness [N].
+double forceInBone(double spacing, double thick)
+{
+    const auto body = tests::voxelBody(Index3(60, 42, 60), Vec3(-30e-3, -5e-3, -30e-3), spacing, [&](Vec3 p) {
+        const bool inside = std::abs(p.x) < 25e-3 && p.y > 0.0 && p.y < 33e-3 && std::abs(p.z) < 25e-3;
+        return !inside ? 0 : p.y > 30e-3 || (p.y > 5e-3 && p.y < 5e-3 + thick) ? 2 : 1;
+    });
+    Elastic elastic(body, {}, tests::focusUnder(Vec3(0.0)));
+    for (double d = -1e-3; d <= 7e-3; d += 20e-6) {
+        std::array tools{tests::ball(Vec3(0.7e-3, d - 10e-3, 0.4e-3), 10e-3)};
+        tools[0].pushed = Vec3(0.0, std::max(d, 0.0), 0.0);
+        elastic.relax(tests::loadOf(tools, {}, tools[0].shape.a));
+    }
+    return -elastic.toolForce(0).y;
+}
+
+// A tool is stopped by 4 N per millimetre where bone begins, however thin the bone is. Without a rule for it a plate of a
+// millimetre was gone through with a third of that.
+TEST(HeldNodes, ThinBoneStopsATool)
+{
+    for (const double spacing : {2e-3, 4e-3}) {
+        const double thick = forceInBone(spacing, 25e-3);
+        EXPECT_GT(thick, 8.0);
+        for (const double plate : {1e-3, 2e-3, 3e-3}) {
+            EXPECT_NEAR(forceInBone(spacing, plate), thick, 2.0) << spacing << " " << plate;
+        }
+    }
+}
+
 // A column on a board that ends inside of a cell of each wider window: it was held in none of these, and went away from the
 // ball without a force.
 TEST(HeldNodes, AThinBoardHoldsATallBody)
