@@ -123,10 +123,11 @@ inline double poissonAt(const CellLevel& level, Vec3 at) noexcept
     return level.nodes.contains(cell) && mu > 0.0 ? 0.5 * lambda / (lambda + mu) : softPoisson;
 }
 
-/// Bone in a cell of the finest level that no cell of bone alone is beside.
-struct ThinBone {
+/// Where bone lies in a cell of the finest level that it does not fill.
+struct BoneCell {
     Index3 cell{0};
     std::array<std::uint8_t, volume::HeldParts::edgeCount> edges{};  // HeldParts::edges
+    bool isPlate = false;  // through the cell, without a cell of bone alone beside it
 };
 
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
@@ -140,9 +141,8 @@ struct ElasticBody {
     std::vector<std::uint32_t> subsurfaceRows;  // see rowsOf()
     double pieceEdge = 0;                       // of the sub-cells of which each of them stands for the surface [m]
     std::vector<float> held;              // of each cell of the finest level, what share of its tissue is held in space
-    std::vector<float> thick;             // the same but of thin bone; empty: as `held`
-    std::vector<ThinBone> thinBone;       // by z, then y, then x
-    std::vector<std::uint32_t> thinRows;  // see rowsOf()
+    std::vector<BoneCell> bone;           // by z, then y, then x; empty where there is no plate of thin bone
+    std::vector<std::uint32_t> boneRows;  // see rowsOf()
     bool relaxes = false;                 // its moduli are those right after a step
 };
 

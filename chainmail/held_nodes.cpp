@@ -159,9 +159,8 @@ private:
     {
         constexpr float least = 0.08F;  // of the cell
         const volume::CellMaterial& m = materialAt(cell);
-        const Vec3f middle = m.held.middle;
-        if (!hasHeld(cell) && m.fixed * m.fraction >= least && middle != Vec3f(0.0F)) {
-            found.push_back(nodes_.offset(cell + Index3(glm::greaterThan(middle, Vec3f(0.0F)))));
+        if (!hasHeld(cell) && m.fixed * m.fraction >= least) {
+            found.push_back(nodes_.offset(cell + Index3(glm::greaterThan(m.held.middle, Vec3f(0.0F)))));
         }
     }
 
@@ -177,30 +176,35 @@ private:
         }
     }
 
-    // Takes what lies between held faces of a cell and bone across it out of the cell.
+    // Takes what lies between held faces of a cell and bone across it out of the cell, along the axis with most of that:
+    // an oblique plate may cross the cell along several.
     void leaveOut(Index3 cell, std::vector<std::pair<std::size_t, float>>& longer)
     {
-        volume::CellMaterial& m = materials_[cells_.offset(cell)];
-        float left = 0.0F;
-        for (int i = 0; i < 6; ++i) {
-            const int axis = i / 2, side = i % 2;
-            const float gap = gapTo(cell, axis, side);
-            Index3 next = cell;
-            next[axis] += 2 * side - 1;
-            if (gap > 0.0F) {
-                left += gap;
-                if (next == glm::clamp(next, Index3(0), cells_.size - 1)) {
-                    longer.emplace_back(cells_.offset(next), gap);
-                }
+        int along = 0;
+        std::array<float, 2> gaps{};
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::array<float, 2> own{gapTo(cell, axis, 0), gapTo(cell, axis, 1)};
+            if (own[0] + own[1] > gaps[0] + gaps[1]) {
+                gaps = own;
+                along = axis;
             }
         }
-        if (left == 0.0F) {
+        if (gaps[0] + gaps[1] == 0.0F) {
             return;
         }
-        constexpr float least = 1.0F / 64.0F;  // of a cell that counts as strained
-        const float bone = m.fixed * m.fraction, held = std::min(bone + left, m.fraction);
-        m.youngsModulus *= std::max(m.fraction - bone, least) / std::max(m.fraction - held, least);
-        m.fixed = held / m.fraction;
+        for (int side = 0; side < 2; ++side) {
+            Index3 next = cell;
+            next[along] += 2 * side - 1;
+            const float gap = gaps[static_cast<std::size_t>(side)];
+            if (gap > 0.0F && next == glm::clamp(next, Index3(0), cells_.size - 1)) {
+                longer.emplace_back(cells_.offset(next), gap);
+            }
+        }
+        constexpr float least = 1.0F / 32.0F;  // of a cell's tissue that counts as strained: so it is not wholly held
+        volume::CellMaterial& m = materials_[cells_.offset(cell)];
+        const float held = std::max(std::min(m.fixed + gaps[0] + gaps[1], 1.0F - least), m.fixed);
+        m.youngsModulus *= held > m.fixed ? (1.0F - m.fixed) / (1.0F - held) : 1.0F;
+        m.fixed = held;
     }
 
     // Between a face of a cell, if all of it is held, and bone that crosses all edges from there on [cells]; or 0.

@@ -171,7 +171,7 @@ TEST(HeldNodes, WhatLiesBehindBoneIsNotFelt)
 // A plate through all of a body parts the nodes of every level, also of those whose cells are far wider than it is thick.
 TEST(HeldNodes, APlatePartsWiderLevelsToo)
 {
-    for (const double place : {9e-3, 14e-3, 18e-3, 23e-3, 31e-3}) {
+    for (const double place : {9e-3, 14e-3, 23e-3, 31e-3, 41e-3}) {
         const auto body = tests::voxelBody(Index3(78, 72, 78), Vec3(-39e-3, -6e-3, -39e-3), 2e-3, [&](Vec3 p) {
             const bool inside = std::abs(p.x) < 34e-3 && p.y > 0.0 && p.y < 60e-3 && std::abs(p.z) < 34e-3;
             return !inside ? 0 : p.y > place && p.y < place + 1e-3 ? 2 : 1;
