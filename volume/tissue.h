@@ -58,7 +58,7 @@ struct CompanionImage {
 
 /// Where in a cell tissue lies that is held in space, of cells with such tissue.
 struct HeldParts {
-    static constexpr int edgeCount = 12;
+    static constexpr int edgeCount = 12;  ///< of a cell
     /// Which eighths of each edge it lies on, a bit for each from the edge's lower end on. Edge `e` runs along axis e / 4.
     std::array<std::uint8_t, edgeCount> edges{};
     Vec3f middle{0.0F};  // of it, -1 to 1 along each edge of the cell
@@ -95,7 +95,7 @@ struct CellMaterial {
     /// Which of its 64 parts, a quarter of an edge wide, have tissue in their middle, a bit for each, x fastest; all of
     /// them where voxels are longer than three quarters of a cell.
     std::uint64_t quarters = ~std::uint64_t{0};
-    HeldParts held{};
+    HeldParts held{};  ///< what is held in space by its tissue, such as bone, not by a support
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.
