@@ -21,7 +21,7 @@ struct MixedCell {
 struct FinestLevel {
     CellLevel level;          // without layers, `diagonal` and `radius`
     std::vector<float> held;  // fraction of each cell's tissue that is held in space (count x 1)
-    /// Not 0 for nodes around which half of the tissue is held (count x 1). `level.fixed` holds more: all nodes of a cell
+    /// Not 0 for the nodes that heldNodes() finds (count x 1). `level.fixed` holds more: all nodes of a cell
     /// whose tissue is held, also those that it does not reach, where it is bone beside air. Coarser levels do not inherit
     /// these.
     std::vector<std::uint8_t> mostlyHeld;

@@ -52,7 +52,7 @@ const BoneCell* boneAt(const ElasticBody& body, Index3 cell) noexcept
 
 // A place between where a plate of bone begins and ends along an axis, both in cells from the place.
 struct Across {
-    double weight = 0.0;  // of the columns of edges around the place that the plate crosses, trilinear
+    double weight = 0.0;  // of the lines of edges around the place that the plate crosses, bilinear
     double from = 0.0, to = 0.0;
 };
 
@@ -87,7 +87,7 @@ Across acrossPlate(const ElasticBody& body, Index3 cell, Vec3 in, int axis) noex
 // whether half of the tissue around it is held: over that, which is 1 or more in it.
 double inHeld(const ElasticBody& body, Vec3 at, int axis) noexcept
 {
-    constexpr double half = 0.5;  // of the columns
+    constexpr double half = 0.5;  // of the lines
     const auto& grid = body.levels.front().nodes;
     const Index3 cell = grid.cellAt(at);
     const BoneCell* own = body.bone.empty() ? nullptr : boneAt(body, cell);

@@ -92,8 +92,9 @@ TEST(HeldNodes, APlatePartsWhatLiesOnItsSides)
     }
 }
 
-// A plate along the grid holds one plane of boneNodes. What the tissue on its two sides has lost or won so is made up for:
-// in series, a cell that is shorter by g has 1 / (1 - g) times its modulus, and one that is longer 1 / (1 + g).
+// A plate along the grid holds one plane of nodes. What the tissue on its two sides has lost or won so is made up for: a
+// cell that is shorter by g has 1 / (1 - g) times its modulus, and one that is longer between the 1 / (1 + g) of tissue
+// that is pressed together alone and the cube of that, of tissue that flows sideways.
 TEST(HeldNodes, WhatAPlateIsMovedByIsMadeUpFor)
 {
     for (int axis = 0; axis < 3; ++axis) {
